@@ -1,0 +1,51 @@
+# weldcell_module(NAME RING ring DEPENDS modules... LIBS external...)
+# One static library a folder: src/NAME/*.cpp with include/weldcell/NAME/*.hpp. What DEPENDS does not
+# name does not link. Tests lie in tests/unit/NAME/*_test.cpp and become test_NAME.
+function(weldcell_module NAME)
+  cmake_parse_arguments(ARG "" "RING" "DEPENDS;LIBS" ${ARGN})
+  file(GLOB SOURCES CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/src/${NAME}/*.cpp)
+  list(FILTER SOURCES EXCLUDE REGEX "/main_[a-z_]*\\.cpp$")
+  set(LIBRARIES "")
+  foreach(DEPENDENCY IN LISTS ARG_DEPENDS)
+    list(APPEND LIBRARIES weldcell_${DEPENDENCY})
+  endforeach()
+  if(SOURCES)
+    add_library(weldcell_${NAME} STATIC ${SOURCES})
+    target_include_directories(weldcell_${NAME} PUBLIC ${CMAKE_SOURCE_DIR}/include
+                               PRIVATE ${CMAKE_SOURCE_DIR}/src)
+    target_link_libraries(weldcell_${NAME} PUBLIC ${LIBRARIES} ${ARG_LIBS})
+    target_compile_options(weldcell_${NAME} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Werror)
+  else()
+    add_library(weldcell_${NAME} INTERFACE)
+    target_include_directories(weldcell_${NAME} INTERFACE ${CMAKE_SOURCE_DIR}/include)
+    target_link_libraries(weldcell_${NAME} INTERFACE ${LIBRARIES} ${ARG_LIBS})
+  endif()
+  set_property(GLOBAL APPEND PROPERTY WELDCELL_MODULES ${NAME})
+endfunction()
+
+# weldcell_program(NAME module): src/<module>/main_<name>.cpp, linked with the module's library.
+function(weldcell_program NAME MODULE)
+  string(REPLACE "-" "_" FILE_NAME ${NAME})
+  set(MAIN ${CMAKE_SOURCE_DIR}/src/${MODULE}/main_${FILE_NAME}.cpp)
+  if(EXISTS ${MAIN})
+    add_executable(${NAME} ${MAIN})
+    target_link_libraries(${NAME} PRIVATE weldcell_${MODULE})
+    target_include_directories(${NAME} PRIVATE ${CMAKE_SOURCE_DIR}/src)
+    target_compile_options(${NAME} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Werror)
+    target_compile_definitions(${NAME} PRIVATE WELDCELL_VERSION="${PROJECT_VERSION}")
+  endif()
+endfunction()
+
+# weldcell-cad: the only program that links the CAD libraries; a child process of the others.
+function(weldcell_cad_program)
+  file(GLOB SOURCES CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/src/cad/*.cpp)
+  if(SOURCES)
+    add_executable(weldcell-cad ${SOURCES})
+    target_include_directories(weldcell-cad PRIVATE ${CMAKE_SOURCE_DIR}/include ${CMAKE_SOURCE_DIR}/src)
+    target_include_directories(weldcell-cad SYSTEM PRIVATE /usr/include/opencascade)
+    target_compile_options(weldcell-cad PRIVATE -Wall -Wextra -Wshadow -Wconversion -Werror)
+    target_link_libraries(weldcell-cad PRIVATE weldcell_files weldcell_workpiece dxflib
+      TKXDESTEP TKXSBase TKXCAF TKLCAF TKHLR TKTopAlgo TKBRep TKGeomBase TKG3d TKG2d TKMath TKernel
+      TKSTEP TKSTEPAttr TKSTEP209 TKSTEPBase TKCDF TKCAF TKGeomAlgo)
+  endif()
+endfunction()

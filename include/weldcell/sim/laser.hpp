@@ -1,0 +1,35 @@
+// The simulated laser: samples on its own clock, ray-cast on the members as they really lie, as MEAS-28 bytes.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "weldcell/base/time.hpp"
+#include "weldcell/geometry/transform.hpp"
+#include "weldcell/sim/scene.hpp"
+
+namespace weldcell::sim {
+
+/// Bytes that leave the sensor together and when they arrive at the host (true time).
+struct LaserBlock {
+  HostTime arrival;
+  std::vector<std::byte> bytes;
+};
+
+class LaserDevice {
+ public:
+  using PoseAt = std::function<Transform<Base, Flange>(HostTime)>;
+  explicit LaserDevice(const Scene& scene);
+  ~LaserDevice();
+
+  /// All blocks whose samples were taken up to true time `now`; pose_at is asked for instants up to `now`.
+  std::vector<LaserBlock> advance(HostTime now, const PoseAt& pose_at);
+  void inject(const std::string& fault, double duration_s);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace weldcell::sim
