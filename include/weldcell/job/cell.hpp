@@ -1,0 +1,251 @@
+// The only brain: Cell::step(Input) -> Outputs. Holds the job at hand, its state and its evidence; no thread, clock or I/O.
+// Pure; the cell thread steps it, replay and trials do the same.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "weldcell/base/time.hpp"
+#include "weldcell/job/state_table.hpp"
+#include "weldcell/job/work.hpp"
+#include "weldcell/robot/egm_session.hpp"
+#include "weldcell/wire/egm.hpp"
+#include "weldcell/wire/laser.hpp"
+#include "weldcell/wire/plc_map.hpp"
+
+namespace weldcell::job {
+
+enum class Link : std::uint8_t { Laser, Rws, Plc };
+inline constexpr std::size_t kLinks = 3;
+const char* to_string(Link);
+
+/// Fault numbers as the PLC reads them (docs/PLC.md).
+enum class FaultCode : std::uint16_t {
+  None = 0, EgmLost = 10, EgmNotStarted = 11, MotionRefused = 12, RobotStopped = 13, LaserLost = 20, LaserOverrun = 21,
+  RobotCommand = 30, ProgramStopped = 31, PlcLost = 40, StoppedByPerson = 50
+};
+const char* to_string(FaultCode);
+
+// ---- inputs, one at a time, in the order of their arrival ----
+
+struct Tick {};
+/// One EGM cycle as the real-time thread did it: the datagram, our reply, and the session's report.
+struct EgmCycle {
+  std::vector<std::byte> datagram, reply;
+  robot::EgmReport report;
+};
+struct LaserBytes {
+  std::vector<std::byte> bytes;
+};
+struct LinkChange {
+  Link link = Link::Laser;
+  bool up = false;
+  std::string detail;
+};
+struct PlcInput {
+  wire::PlcOrder order;
+};
+struct OperatorCommand {
+  wire::PlcCommand command = wire::PlcCommand::None;
+  std::string who;  ///< "plc", "cli"
+};
+/// A job taken from the spool. `resume_from` is set for one found interrupted at start.
+struct JobArrived {
+  std::string id;                   ///< the spool folder's name
+  JobOrder order;
+  int number = 0;
+  bool interrupted = false;
+  int seams_done = 0;               ///< of an interrupted job
+  bool guidance_done = false;
+};
+struct ImportDone {
+  Result<workpiece::Workpiece> workpiece;
+};
+struct PlanDone {
+  Result<std::shared_ptr<const Prepared>> prepared;
+};
+struct PassPlanned {
+  Result<std::shared_ptr<const NextPass>> pass;
+};
+struct SolveDone {
+  std::shared_ptr<const Solution> solution;
+};
+/// Answer to a RobotRequest of the same id.
+struct RobotReply {
+  std::uint64_t id = 0;
+  bool ok = false;
+  std::string text;          ///< cause and mend when not ok
+  bool running = false;      ///< of Query: RAPID executes
+  int seams_done = 0;        ///< of Query
+};
+/// Raw data were lost before they reached the cell (a ring was full).
+struct Overrun {
+  Link link = Link::Laser;
+  std::uint64_t lost = 0;
+};
+
+using InputBody = std::variant<Tick, EgmCycle, LaserBytes, LinkChange, PlcInput, OperatorCommand, JobArrived, ImportDone,
+                               PlanDone, PassPlanned, SolveDone, RobotReply, Overrun>;
+struct Input {
+  HostTime time;
+  InputBody body;
+};
+
+// ---- outputs ----
+
+enum class RobotTask : std::uint8_t { Move, OpenScan, Stop, Upload, Weld, Query };
+const char* to_string(RobotTask);
+struct RobotRequest {
+  std::uint64_t id = 0;
+  RobotTask task = RobotTask::Query;
+  kinematics::Joints joints{};  ///< Move, OpenScan: where RAPID moves first
+  std::string module_text;      ///< Upload
+  int skip_seams = 0;           ///< Weld
+};
+struct ImportRequest {};
+struct PlanRequest {};
+struct PassRequest {};
+struct SolveRequest {
+  std::shared_ptr<const ScanRecord> scan;
+};
+struct StartMotion {
+  std::shared_ptr<const plan::MotionPlan> plan;
+};
+struct StopMotion {};
+struct SetArmed {
+  bool armed = false;
+};
+struct ShowDrawing {
+  std::shared_ptr<const guidance::Drawing> drawing;  ///< null: dark
+  int step = 0;                                      ///< 1-based
+};
+/// Must be durable before anything else of the same step takes effect.
+struct SaveState {
+  State state = State::Idle;
+  int seams_done = 0;
+  bool guidance_done = false;
+};
+struct FinishJob {
+  bool accepted = false;
+  std::string verdict;  ///< weld | rescan | reject | failed | aborted
+  std::string reason;
+};
+struct LogEvent {
+  enum class Level : std::uint8_t { Info, Warning, Error } level = Level::Info;
+  std::string text;
+};
+
+using Output = std::variant<RobotRequest, ImportRequest, PlanRequest, PassRequest, SolveRequest, StartMotion, StopMotion,
+                            SetArmed, ShowDrawing, SaveState, FinishJob, LogEvent>;
+using Outputs = std::vector<Output>;
+
+/// What can be asked of the cell at any time.
+struct CellStatus {
+  State state = State::Idle;
+  bool armed = false;
+  std::string job;
+  int guide_step = 0, guide_steps = 0;
+  FaultCode fault = FaultCode::None;
+  std::string fault_text;
+  double progress = 0;  ///< 0..1 of the scan or the seams
+  int pass = 0;
+  int seams_done = 0, seams = 0;
+  std::array<bool, kLinks> links{};
+  wire::PlcStatus plc;
+};
+
+/// Timeouts in which the world must answer. Virtual or real seconds.
+struct CellTimeouts {
+  double egm_gap_s = 0.15;
+  double egm_open_s = 30;
+  double query_s = 0.4;
+  double laser_gap_s = 0.25;
+  double settle_s = 0.1;      ///< rest after a scan, so that the last readings arrive
+};
+
+class Cell {
+ public:
+  Cell(const cell::CellSetup& setup, const wire::Meas28Layout& laser, bool plc_required, CellTimeouts timeouts = {});
+
+  Outputs step(const Input& input);
+
+  const CellStatus& status() const { return status_; }
+  /// True while laser bytes are wanted; else the caller may keep them to itself.
+  bool wants_laser() const;
+  /// Fits a new job: nothing under way.
+  bool takes_jobs() const;
+
+  const std::optional<JobInput>& job() const { return job_; }
+  std::shared_ptr<const Prepared> prepared() const { return prepared_; }
+  std::shared_ptr<const Solution> solution() const { return solution_; }
+  std::shared_ptr<const NextPass> next_pass() const { return next_pass_; }
+
+ private:
+  void on(const Tick&);
+  void on(const EgmCycle& cycle);
+  void on(const LaserBytes& bytes);
+  void on(const LinkChange& change);
+  void on(const PlcInput& input);
+  void on(const OperatorCommand& command);
+  void on(const JobArrived& arrived);
+  void on(const ImportDone& done);
+  void on(const PlanDone& done);
+  void on(const PassPlanned& done);
+  void on(const SolveDone& done);
+  void on(const RobotReply& reply);
+  void on(const Overrun& overrun);
+
+  /// Takes the first row whose guard holds; false when there is none.
+  bool fire(Event event);
+  bool holds(Guard guard) const;
+  void act(Action action);
+  void fault(FaultCode code, const std::string& text);
+  void finish_with(bool accepted, const std::string& verdict, const std::string& reason);
+  /// 0 done, 1 refused in this state, 2 unknown: the PLC's command_result.
+  int command(wire::PlcCommand command, const std::string& who);
+  void set_armed(bool armed);
+  void request(RobotTask task);
+  void begin_scan();
+  void enter(State state);
+  void watch_scan();
+  void log(LogEvent::Level level, const std::string& text);
+  void refresh_plc();
+  std::string start_hindrance() const;
+  const std::shared_ptr<const plan::MotionPlan>& scan_plan() const;
+
+  cell::CellSetup setup_;
+  bool plc_required_;
+  CellTimeouts timeouts_;
+  CellStatus status_;
+  Outputs out_;
+  HostTime now_;
+
+  std::optional<JobInput> job_;
+  std::string job_id_;
+  std::shared_ptr<const Prepared> prepared_;
+  std::shared_ptr<const NextPass> next_pass_;
+  std::shared_ptr<const Solution> solution_;
+  std::shared_ptr<ScanRecord> scan_;
+  std::string failure_;
+  State resume_state_ = State::Idle;
+  bool resuming_ = false;
+  bool guidance_done_ = false;
+  int guide_step_ = 0;
+
+  wire::EgmCodec codec_;
+  wire::Meas28Decoder laser_decoder_;
+  std::uint64_t next_request_ = 1, awaited_request_ = 0;
+  RobotTask awaited_task_ = RobotTask::Query;
+  bool program_started_ = false;
+  int running_frames_ = 0;
+  HostTime state_since_, last_egm_, last_laser_, last_query_, motion_done_at_;
+  bool egm_seen_ = false, motion_started_ = false, motion_finished_ = false;
+  std::uint16_t last_sequence_ = 0;
+  bool sequence_known_ = false;
+};
+
+}  // namespace weldcell::job

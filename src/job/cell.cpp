@@ -1,0 +1,286 @@
+#include "weldcell/job/cell.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace weldcell::job {
+
+const char* to_string(Link link) {
+  switch (link) {
+    case Link::Laser: return "laser";
+    case Link::Rws: return "robot controller";
+    case Link::Plc: return "PLC";
+  }
+  return "?";
+}
+
+const char* to_string(FaultCode code) {
+  switch (code) {
+    case FaultCode::None: return "none";
+    case FaultCode::EgmLost: return "EGM frames stopped";
+    case FaultCode::EgmNotStarted: return "EGM did not start";
+    case FaultCode::MotionRefused: return "motion refused";
+    case FaultCode::RobotStopped: return "robot stopped";
+    case FaultCode::LaserLost: return "laser lost";
+    case FaultCode::LaserOverrun: return "laser data lost";
+    case FaultCode::RobotCommand: return "robot command failed";
+    case FaultCode::ProgramStopped: return "weld program stopped early";
+    case FaultCode::PlcLost: return "PLC lost";
+    case FaultCode::StoppedByPerson: return "stopped by a person";
+  }
+  return "?";
+}
+
+const char* to_string(RobotTask task) {
+  switch (task) {
+    case RobotTask::Move: return "move";
+    case RobotTask::OpenScan: return "open scan";
+    case RobotTask::Stop: return "stop";
+    case RobotTask::Upload: return "upload";
+    case RobotTask::Weld: return "weld";
+    case RobotTask::Query: return "query";
+  }
+  return "?";
+}
+
+Cell::Cell(const cell::CellSetup& setup, const wire::Meas28Layout& laser, bool plc_required, CellTimeouts timeouts)
+    : setup_(setup), plc_required_(plc_required), timeouts_(timeouts), laser_decoder_(laser) {
+  refresh_plc();
+}
+
+Outputs Cell::step(const Input& input) {
+  now_ = input.time;
+  out_.clear();
+  std::visit([this](const auto& body) { on(body); }, input.body);
+  refresh_plc();
+  return std::exchange(out_, {});
+}
+
+bool Cell::wants_laser() const {
+  return status_.state == State::PreparingScan || status_.state == State::Scanning;
+}
+
+bool Cell::takes_jobs() const {
+  return status_.state == State::Idle || status_.state == State::Done || status_.state == State::Failed;
+}
+
+// ---- inputs ----
+
+void Cell::on(const Tick&) {
+  switch (status_.state) {
+    case State::PreparingScan:
+      if (seconds(now_ - state_since_) > timeouts_.egm_open_s) {
+        fault(FaultCode::EgmNotStarted,
+              "no running EGM session within " + std::to_string(static_cast<int>(timeouts_.egm_open_s)) +
+                  " s: look at the FlexPendant's event log, at UdpUc address and port, and at module WeldcellEgm");
+      }
+      break;
+    case State::Scanning: watch_scan(); break;
+    case State::Welding:
+      if (program_started_ && awaited_request_ == 0 && seconds(now_ - last_query_) > timeouts_.query_s) {
+        last_query_ = now_;
+        request(RobotTask::Query);
+      }
+      break;
+    default: break;
+  }
+}
+
+void Cell::watch_scan() {
+  if (seconds(now_ - last_laser_) > timeouts_.laser_gap_s) {
+    fault(FaultCode::LaserLost, "no laser readings: check the sensor's power and network, then arm and resume");
+  } else if (motion_finished_) {
+    if (seconds(now_ - motion_done_at_) >= timeouts_.settle_s) fire(Event::MotionDone);
+  } else if (seconds(now_ - last_egm_) > timeouts_.egm_gap_s) {
+    fault(FaultCode::EgmLost, "the robot controller sends no EGM frames: the robot has stopped by its own time-out");
+  }
+}
+
+void Cell::on(const EgmCycle& cycle) {
+  last_egm_ = now_;
+  wire::EgmFeedback feedback;
+  if (codec_.decode(cycle.datagram, feedback) != wire::EgmDecode::Ok) return;
+  const bool running = feedback.motors == wire::MotorState::On && feedback.mci == wire::MciState::Running &&
+                       feedback.rapid != wire::RapidState::Stopped;
+  if (status_.state == State::PreparingScan) {
+    // A few frames in a row, so that a session that dies at once does not count as open.
+    constexpr int kSettledFrames = 5;
+    running_frames_ = running ? running_frames_ + 1 : 0;
+    if (running_frames_ >= kSettledFrames) fire(Event::EgmReady);
+    return;
+  }
+  if (status_.state != State::Scanning || motion_finished_) return;
+  scan_->feedback.push_back({now_, feedback});
+
+  const auto& plan = scan_plan();
+  const robot::EgmReport& report = cycle.report;
+  if (!running) {
+    fault(FaultCode::RobotStopped, "the controller left EGM while scanning (motors off, emergency stop or program stop)");
+  } else if (report.plan_id == plan->id && report.plan_done) {
+    motion_finished_ = true;
+    motion_done_at_ = now_;
+    status_.progress = 1;
+  } else if (report.plan_id == plan->id && report.phase == robot::EgmPhase::Following) {
+    motion_started_ = true;
+    status_.progress = plan->duration_s() > 0 ? report.plan_time_s / plan->duration_s() : 1;
+  } else if (motion_started_) {
+    fault(FaultCode::EgmLost, "the EGM session restarted or stopped in the middle of the scan");
+  } else if (report.refusal != robot::EgmRefusal::None) {
+    fault(FaultCode::MotionRefused, std::string("the motion was not begun: ") + robot::to_string(report.refusal));
+  } else if (seconds(now_ - state_since_) > 2.0) {
+    fault(FaultCode::MotionRefused, "the motion did not begin within 2 s");
+  }
+}
+
+void Cell::on(const LaserBytes& bytes) {
+  last_laser_ = now_;
+  const bool keep = status_.state == State::Scanning;
+  laser_decoder_.feed(bytes.bytes, [&](const wire::LaserReading& reading) {
+    if (keep) scan_->readings.push_back({now_, reading});
+  });
+}
+
+void Cell::on(const LinkChange& change) {
+  bool& up = status_.links[static_cast<std::size_t>(change.link)];
+  if (up == change.up) return;
+  up = change.up;
+  log(up ? LogEvent::Level::Info : LogEvent::Level::Warning,
+      std::string(to_string(change.link)) + (up ? " connected" : " lost") +
+          (change.detail.empty() ? "" : ": " + change.detail));
+  if (up) return;
+  const State state = status_.state;
+  if (change.link == Link::Laser && state == State::Scanning) {
+    fault(FaultCode::LaserLost, "the laser's connection closed: " + change.detail);
+  }
+  if (change.link == Link::Plc && plc_required_ && under_way(state) && state != State::Importing &&
+      state != State::Planning && state != State::Ready) {
+    fault(FaultCode::PlcLost, "the PLC's heartbeat stopped: controlled stop");
+  }
+}
+
+void Cell::on(const PlcInput& input) {
+  const wire::PlcOrder& order = input.order;
+  // What stands in the registers when the PLC connects is history, not an order.
+  const bool fresh = sequence_known_ && order.command_sequence != last_sequence_;
+  sequence_known_ = true;
+  last_sequence_ = order.command_sequence;
+  status_.plc.command_ack = order.command_sequence;
+  if (fresh) status_.plc.command_result = static_cast<std::uint16_t>(command(order.command, "plc"));
+}
+
+void Cell::on(const OperatorCommand& order) { command(order.command, order.who); }
+
+void Cell::on(const JobArrived& arrived) {
+  WELDCELL_ASSERT(takes_jobs());
+  job_ = JobInput{arrived.order, {}};
+  job_id_ = arrived.id;
+  prepared_.reset();
+  next_pass_.reset();
+  solution_.reset();
+  scan_.reset();
+  failure_.clear();
+  resuming_ = false;
+  guidance_done_ = arrived.guidance_done;
+  guide_step_ = 0;
+  status_.job = arrived.order.name;
+  status_.fault = FaultCode::None;
+  status_.fault_text.clear();
+  status_.pass = 0;
+  status_.progress = 0;
+  status_.seams_done = arrived.seams_done;
+  status_.seams = 0;
+  status_.plc.job_number = 0;
+  if (!arrived.interrupted) {
+    fire(Event::JobArrived);
+    return;
+  }
+  if (status_.state != State::Idle) enter(State::Idle);
+  resume_state_ = guidance_done_ || !arrived.order.guidance ? State::PreparingScan : State::GuideMoving;
+  log(LogEvent::Level::Warning, "job '" + arrived.order.name +
+                                    "' was interrupted: make the cell safe, then arm and resume it, or abort it");
+  fire(Event::JobFound);
+}
+
+void Cell::on(const ImportDone& done) {
+  if (status_.state != State::Importing) return;
+  if (!done.workpiece.ok()) {
+    failure_ = done.workpiece.error().text();
+    fire(Event::StepFailed);
+    return;
+  }
+  job_->workpiece = *done.workpiece;
+  status_.seams = static_cast<int>(job_->workpiece.welds.size());
+  fire(Event::Imported);
+}
+
+void Cell::on(const PlanDone& done) {
+  if (status_.state != State::Planning) return;
+  if (!done.prepared.ok()) {
+    failure_ = done.prepared.error().text();
+    fire(Event::StepFailed);
+    return;
+  }
+  prepared_ = *done.prepared;
+  status_.guide_steps = static_cast<int>(prepared_->steps.size());
+  fire(Event::Planned);
+}
+
+void Cell::on(const PassPlanned& done) {
+  if (status_.state != State::PlanningPass) return;
+  if (!done.pass.ok()) {
+    failure_ = done.pass.error().text();
+    fire(Event::StepFailed);
+    return;
+  }
+  next_pass_ = *done.pass;
+  fire(Event::Planned);
+}
+
+void Cell::on(const SolveDone& done) {
+  if (status_.state != State::Localizing) return;
+  solution_ = done.solution;
+  failure_ = solution_->verdict.reason;
+  fire(Event::Solved);
+}
+
+void Cell::on(const RobotReply& reply) {
+  if (reply.id == 0 || reply.id != awaited_request_) return;
+  awaited_request_ = 0;
+  if (!reply.ok) {
+    if (under_way(status_.state)) {
+      fault(FaultCode::RobotCommand, std::string("robot command '") + to_string(awaited_task_) + "': " + reply.text);
+    }
+    return;
+  }
+  switch (awaited_task_) {
+    case RobotTask::Move:
+    case RobotTask::Upload: fire(Event::RobotDone); break;
+    case RobotTask::Weld:
+      program_started_ = true;
+      last_query_ = now_;
+      break;
+    case RobotTask::Query:
+      if (status_.state != State::Welding) break;
+      if (reply.seams_done > status_.seams_done) {
+        status_.seams_done = reply.seams_done;
+        status_.progress = status_.seams > 0 ? static_cast<double>(status_.seams_done) / status_.seams : 1;
+        log(LogEvent::Level::Info, "seam " + std::to_string(status_.seams_done) + " of " +
+                                       std::to_string(status_.seams) + " welded");
+        out_.push_back(SaveState{status_.state, status_.seams_done, guidance_done_});
+      }
+      if (!reply.running && !fire(Event::ProgramEnded)) {
+        fault(FaultCode::ProgramStopped, "the weld program stopped after seam " + std::to_string(status_.seams_done) +
+                                             " of " + std::to_string(status_.seams) + ": " + reply.text);
+      }
+      break;
+    default: break;
+  }
+}
+
+void Cell::on(const Overrun& overrun) {
+  if (status_.state != State::Scanning) return;
+  fault(FaultCode::LaserOverrun, std::string(to_string(overrun.link)) + ": " + std::to_string(overrun.lost) +
+                                     " blocks lost inside the controller: the machine is overloaded");
+}
+
+}  // namespace weldcell::job

@@ -1,0 +1,177 @@
+#include "weldcell/job/work.hpp"
+
+#include <algorithm>
+#include <bit>
+
+namespace weldcell::job {
+
+namespace {
+
+double top_z_mm(const cell::CellSetup& cell, const workpiece::Workpiece& workpiece) {
+  return cell.table.z_mm + workpiece.height_mm;
+}
+
+/// The first look: as ordered, or for an adaptive inspection a spiral over the whole.
+plan::Pattern first_pattern(const plan::Inspection& inspection) {
+  return inspection.pattern == plan::Pattern::Adaptive ? plan::Pattern::Spiral : inspection.pattern;
+}
+
+weld::CertifyOptions certify_options(const cell::CellSetup& cell) {
+  weld::CertifyOptions options;
+  options.table_z_mm = cell.table.z_mm;
+  return options;
+}
+
+/// Certificates as if the part lay exactly as planned: what reach and drawings are checked with.
+std::vector<weld::WeldCertificate> nominal_welds(const cell::CellSetup& cell, const JobInput& job,
+                                                 const workpiece::OutlineTemplate& outline, const Pose2& planned) {
+  localize::Localization perfect;
+  perfect.verdict = localize::Verdict::Weld;
+  perfect.cause = "ok";
+  perfect.pose = planned;
+  perfect.centroid_base = planned * outline.centroid;
+  return weld::certify(job.workpiece, perfect, certify_options(cell));
+}
+
+localize::LocalizeOptions localize_options(const cell::CellSetup& cell, const JobInput& job, const Pose2& planned) {
+  const Acceptance& acceptance = job.order.acceptance;
+  localize::LocalizeOptions options;
+  options.planned = planned;
+  options.range_mm = acceptance.max_offset_mm;
+  options.range_rad = acceptance.max_rotation_rad * 1.25;
+  options.max_offset_mm = acceptance.max_offset_mm;
+  options.max_rotation_rad = acceptance.max_rotation_rad * 1.05;
+  options.max_mean_error_mm = acceptance.max_mean_error_mm;
+  options.latency_sigma_s = cell.laser.latency_sigma_ms * 1e-3;
+  return options;
+}
+
+edges::EdgeOptions edge_options(const cell::CellSetup& cell, const JobInput& job) {
+  edges::EdgeOptions options;
+  options.height_mm = job.workpiece.height_mm;
+  options.spot_mm = cell.laser.spot_mm;
+  options.noise_mm = cell.laser.noise_mm;
+  options.triangulation_rad = cell.laser.triangulation_rad;
+  return options;
+}
+
+void add(edges::EdgeSummary& sum, const edges::EdgeSummary& more) {
+  sum.candidates += more.candidates;
+  sum.accepted += more.accepted;
+  sum.shadowed += more.shadowed;
+  sum.bad_height += more.bad_height;
+  sum.bad_fit += more.bad_fit;
+  sum.paper_slot_too_wide += more.paper_slot_too_wide;
+}
+
+void add_thinned(std::vector<align::SurfacePoint>& shown, const std::vector<align::SurfacePoint>& points) {
+  constexpr std::size_t kMostShown = 12000;
+  const std::size_t stride = std::max<std::size_t>(1, points.size() / kMostShown);
+  for (std::size_t i = 0; i < points.size(); i += stride) shown.push_back(points[i]);
+}
+
+}  // namespace
+
+int max_passes(const JobOrder& order) { return order.inspection.pattern == plan::Pattern::Adaptive ? 3 : 2; }
+
+Result<Prepared> prepare(const cell::CellSetup& cell, const JobInput& job) {
+  Prepared out;
+  auto outline = workpiece::build_template(job.workpiece);
+  if (!outline.ok()) return outline.error();
+  out.outline = *outline;
+
+  if (job.order.planned) {
+    out.planned = *job.order.planned;
+  } else {
+    auto centred = plan::centre_in_envelope(cell, job.workpiece);
+    if (!centred.ok()) return centred.error();
+    out.planned = *centred;
+  }
+
+  out.nominal = nominal_welds(cell, job, out.outline, out.planned);
+  auto torch = weld::plan_torch(cell, job.workpiece, out.nominal, cell.home);
+  if (!torch.ok()) return torch.error();
+
+  if (job.order.guidance) {
+    out.steps = guidance::guide_steps(job.workpiece, out.planned);
+    kinematics::Joints near = cell.home;
+    for (const guidance::GuideStep& step : out.steps) {
+      auto pose = plan::guide_pose(cell, step.centre_base_mm, step.heading_rad, near);
+      if (!pose.ok()) return pose.error();
+      near = pose->joints;
+      out.step_poses.push_back(*pose);
+    }
+  }
+
+  out.paths = plan::beam_paths(job.workpiece, out.planned, job.order.inspection, first_pattern(job.order.inspection));
+  auto scan = plan::plan_scan(cell, out.paths, top_z_mm(cell, job.workpiece), job.order.inspection.speed_mm_s, cell.home);
+  if (!scan.ok()) return scan.error();
+  scan->id = 1;
+  out.scan = std::make_shared<const plan::MotionPlan>(std::move(*scan));
+  return out;
+}
+
+Result<NextPass> plan_next_pass(const cell::CellSetup& cell, const JobInput& job, const Prepared& prepared,
+                                const localize::Localization& found) {
+  plan::Inspection zigzag = job.order.inspection;
+  zigzag.pattern = plan::Pattern::Zigzag;
+  if (job.order.inspection.pattern == plan::Pattern::Adaptive) {
+    // Two crossings in each direction tell shift, angle and latency of every member apart.
+    zigzag.passes_per_member = 4;
+    zigzag.speed_mm_s = std::min(zigzag.speed_mm_s, 200.0);
+  }
+  NextPass out;
+  out.paths = plan::beam_paths(job.workpiece, found.pose, zigzag, plan::Pattern::Zigzag);
+  auto scan = plan::plan_scan(cell, out.paths, top_z_mm(cell, job.workpiece), zigzag.speed_mm_s,
+                              prepared.scan->samples.back().q);
+  if (!scan.ok()) return scan.error();
+  scan->id = prepared.scan->id + 1 + digest(*scan) % 1000000;
+  out.scan = std::make_shared<const plan::MotionPlan>(std::move(*scan));
+  return out;
+}
+
+Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared& prepared, const ScanRecord& scan,
+               const Evidence& before) {
+  Solution out;
+  out.evidence = before;
+  {
+    const std::vector<align::SurfacePoint> points =
+        align::align(cell, scan.readings, scan.feedback, out.evidence.align);
+    const edges::EdgeScan found = edges::detect(points, edge_options(cell, job));
+    out.evidence.edges.insert(out.evidence.edges.end(), found.edges.begin(), found.edges.end());
+    out.evidence.path.insert(out.evidence.path.end(), found.path.begin(), found.path.end());
+    add(out.evidence.edge_summary, found.summary);
+    add_thinned(out.evidence.shown, points);
+  }
+  out.found = localize::localize(prepared.outline, out.evidence.edges, out.evidence.path,
+                                 localize_options(cell, job, prepared.planned));
+  out.certificates = weld::certify(job.workpiece, out.found, certify_options(cell));
+  out.verdict = weld::decide(out.found, out.certificates);
+  if (out.verdict.verdict != localize::Verdict::Weld) return out;
+
+  auto torch = weld::plan_torch(cell, job.workpiece, out.certificates, cell.home);
+  if (!torch.ok()) {
+    out.verdict = {localize::Verdict::Reject, torch.error().text()};
+    return out;
+  }
+  out.torch = std::move(*torch);
+  out.rapid = weld::rapid_module(cell, job.order.name, out.torch);
+  return out;
+}
+
+std::uint64_t digest(const plan::MotionPlan& plan) {
+  // FNV-1a over the bits of every sample.
+  std::uint64_t hash = 14695981039346656037ULL;
+  const auto mix = [&hash](double value) {
+    const auto bits = std::bit_cast<std::uint64_t>(value);
+    for (int shift = 0; shift < 64; shift += 8) hash = (hash ^ ((bits >> shift) & 0xFF)) * 1099511628211ULL;
+  };
+  mix(plan.period_s);
+  for (const plan::MotionSample& sample : plan.samples) {
+    for (const double q : sample.q) mix(q);
+    for (const double qd : sample.qd) mix(qd);
+  }
+  return hash;
+}
+
+}  // namespace weldcell::job
