@@ -1,0 +1,144 @@
+#include "weldcell/workpiece/outline_template.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "self_similarity.hpp"
+
+namespace weldcell::workpiece {
+
+namespace {
+
+/// What lies this close beside a side counts as lying on it.
+constexpr double kTouch_mm = 1e-3;
+
+double cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+/// Parameters in (0, 1) where the line a + t (b - a) meets the polygon's sides.
+void append_crossings(const Segment& line, const Polygon& polygon, std::vector<double>& out) {
+  const Vec2 d = line.b - line.a;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec2& p = polygon[i];
+    const Vec2 e = polygon[(i + 1) % polygon.size()] - p;
+    const double denominator = cross(d, e);
+    if (std::abs(denominator) <= 1e-12 * d.norm() * e.norm()) continue;
+    const double t = cross(p - line.a, e) / denominator;
+    const double s = cross(p - line.a, d) / denominator;
+    if (t > 0 && t < 1 && s > -1e-9 && s < 1 + 1e-9) out.push_back(t);
+  }
+}
+
+Segment shifted(const Segment& s, const Vec2& by) { return {s.a + by, s.b + by}; }
+
+/// Where a side lies with respect to one other member.
+struct Cover {
+  const Polygon* polygon = nullptr;
+  std::vector<double>
+      offsets_mm;  ///< along the outward normal: the side is hidden where a so shifted point is inside
+};
+
+bool hidden(const Vec2& p, const Vec2& outward, const std::vector<Cover>& covers) {
+  for (const Cover& cover : covers) {
+    for (const double offset : cover.offsets_mm) {
+      if (contains(*cover.polygon, p + offset * outward)) return true;
+    }
+  }
+  return false;
+}
+
+/// The visible intervals of a side, as parameters along it.
+std::vector<std::pair<double, double>> visible_intervals(const Segment& side, const Vec2& outward,
+                                                         const std::vector<Cover>& covers) {
+  std::vector<double> cuts{0, 1};
+  for (const Cover& cover : covers) {
+    for (const double offset : cover.offsets_mm)
+      append_crossings(shifted(side, offset * outward), *cover.polygon, cuts);
+  }
+  std::sort(cuts.begin(), cuts.end());
+  std::vector<std::pair<double, double>> out;
+  for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
+    const double from = cuts[i], to = cuts[i + 1];
+    if (to - from <= 1e-9) continue;
+    if (hidden(side.a + (from + to) / 2 * (side.b - side.a), outward, covers)) continue;
+    if (!out.empty() && from - out.back().second <= 1e-9) {
+      out.back().second = to;
+    } else {
+      out.emplace_back(from, to);
+    }
+  }
+  return out;
+}
+
+/// Of two members that share a piece of silhouette only the first one shows it.
+std::vector<Cover> covers_of(const Workpiece& workpiece, std::size_t member, double joint_gap_mm) {
+  std::vector<Cover> covers;
+  for (std::size_t j = 0; j < workpiece.members.size(); ++j) {
+    if (j == member) continue;
+    Cover cover{&workpiece.members[j].outline, {joint_gap_mm, kTouch_mm}};
+    if (j < member) cover.offsets_mm.push_back(-kTouch_mm);
+    covers.push_back(std::move(cover));
+  }
+  return covers;
+}
+
+double longest_side(const Polygon& polygon) {
+  double longest = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    longest = std::max(longest, (polygon[(i + 1) % polygon.size()] - polygon[i]).norm());
+  }
+  return longest;
+}
+
+void append_edges(const Workpiece& workpiece, std::size_t member, double joint_gap_mm,
+                  std::vector<VisibleEdge>& out) {
+  const Polygon& outline = workpiece.members[member].outline;
+  const std::vector<Cover> covers = covers_of(workpiece, member, joint_gap_mm);
+  const double long_side = longest_side(outline) / 2;
+  // A mitre's tip stays uncovered over about one joint gap; it is no edge that a laser could see.
+  const double shortest = std::max(1.0, 2 * joint_gap_mm);
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Segment side{outline[i], outline[(i + 1) % outline.size()]};
+    const Vec2 d = side.direction();
+    VisibleEdge edge;
+    edge.outward = {d.y(), -d.x()};
+    edge.member = static_cast<int>(member);
+    edge.side = static_cast<int>(i);
+    edge.round = workpiece.members[member].edge_radius_mm > 0 && side.length() >= long_side;
+    for (const auto& [from, to] : visible_intervals(side, edge.outward, covers)) {
+      edge.line = {side.a + from * (side.b - side.a), side.a + to * (side.b - side.a)};
+      if (edge.line.length() >= shortest) out.push_back(edge);
+    }
+  }
+}
+
+}  // namespace
+
+Result<OutlineTemplate> build_template(const Workpiece& workpiece, double joint_gap_mm) {
+  OutlineTemplate out;
+  out.name = workpiece.name;
+  out.height_mm = workpiece.height_mm;
+  for (std::size_t i = 0; i < workpiece.members.size(); ++i) {
+    out.member_names.push_back(workpiece.members[i].name);
+    out.members.push_back(workpiece.members[i].outline);
+    append_edges(workpiece, i, joint_gap_mm, out.edges);
+  }
+  if (out.edges.empty()) {
+    return Error{"template.empty", workpiece.name, "no side of any member can be seen from above",
+                 "check the outlines: do they cover each other?"};
+  }
+  double length = 0;
+  Vec2 moment = Vec2::Zero();
+  for (const VisibleEdge& edge : out.edges) {
+    length += edge.line.length();
+    moment += edge.line.length() * (edge.line.a + edge.line.b) / 2;
+  }
+  out.centroid = moment / length;
+  for (const VisibleEdge& edge : out.edges) {
+    out.radius_mm =
+        std::max({out.radius_mm, (edge.line.a - out.centroid).norm(), (edge.line.b - out.centroid).norm()});
+  }
+  out.symmetries = find_symmetries(out);
+  return out;
+}
+
+}  // namespace weldcell::workpiece
