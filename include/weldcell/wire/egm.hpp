@@ -1,4 +1,5 @@
-// EGM datagrams <-> structs, RobotWare 6.07 to 7.16. Pure; real-time safe after the first frame (messages are reused).
+// EGM datagrams <-> structs, RobotWare 6.07 to 7.16. Pure; real-time safe once made: messages are reused and their
+// memory is taken by the constructor.
 #pragma once
 
 #include <array>
@@ -38,7 +39,15 @@ struct EgmCommand {
   std::array<double, 6> speed_deg_s{};
 };
 
-enum class EgmDecode : std::uint8_t { Ok, NotProtobuf, NoHeader, NotData, NoJoints, NotFinite };
+enum class EgmDecode : std::uint8_t {
+  Ok,
+  TooLong,      ///< more than kEgmMaxBytes; not looked at
+  NotProtobuf,  ///< no EgmRobot message, or a required field is missing
+  NoHeader,     ///< header, seqno or tm is missing
+  NotData,      ///< the message type is not DATA: not from a controller
+  NoJoints,     ///< measured joints are not six, or planned joints are neither absent nor six
+  NotFinite     ///< a number used by the daemon is infinite, NaN or (clock) beyond 2^53 us
+};
 const char* to_string(EgmDecode);
 
 /// Largest datagram either side may send; longer ones are refused before decoding.
@@ -52,6 +61,7 @@ class EgmCodec {
   EgmCodec(const EgmCodec&) = delete;
   EgmCodec& operator=(const EgmCodec&) = delete;
 
+  /// Reads one EgmRobot message of either RobotWare; `out` is untouched unless the answer is Ok.
   EgmDecode decode(std::span<const std::byte> datagram, EgmFeedback& out) noexcept;
   /// Writes one EgmSensor CORRECTION message; returns its size, 0 when it does not fit.
   std::size_t encode(const EgmCommand& command, std::span<std::byte> out) noexcept;
