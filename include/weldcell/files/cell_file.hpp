@@ -1,4 +1,5 @@
-// cell.yaml -> CellConfig: the cell's geometry and limits, its devices' addresses and the daemon's own settings.
+// cell.yaml -> CellConfig: the cell's geometry and limits, its devices' addresses and the daemon's own
+// settings.
 #pragma once
 
 #include <string>
@@ -14,21 +15,22 @@ namespace weldcell::files {
 
 struct Endpoint {
   std::string host = "127.0.0.1";
-  int port = 0;                     ///< 0: take a free one and say which
+  int port = 0;  ///< 0: take a free one and say which
 };
 
 enum class RealTime { Off, Try, Required };
 
 struct CellConfig {
-  std::string path;                 ///< of the file
-  std::string text;                 ///< as read, kept in every record
+  std::string path;  ///< of the file
+  std::string text;  ///< as read, kept in every record
   cell::CellSetup setup;
 
   Endpoint egm{"127.0.0.1", 6511};  ///< UDP, we listen
-  std::string egm_peer;             ///< only this source address is answered; "" = the first one seen in a session
+  std::string egm_peer;  ///< only this source address is answered; "" = the first one seen in a session
   Endpoint rws{"127.0.0.1", 8080};
   std::string rws_user = "Default User";
-  std::string rws_password_file;    ///< secrets never stand in YAML; relative to the cell file; or credential "rws-password"
+  std::string rws_password_file;  ///< secrets never stand in YAML; relative to the cell file; or credential
+                                  ///< "rws-password"
   std::string rws_task = "T_ROB1";
   Endpoint laser{"127.0.0.1", 10240};
   std::string laser_dialect = "meas28";
@@ -36,12 +38,12 @@ struct CellConfig {
   Endpoint modbus{"127.0.0.1", 1502};  ///< we listen
   wire::WordOrder word_order = wire::WordOrder::Abcd;
   double plc_heartbeat_timeout_s = 3.0;
-  bool plc_required = true;         ///< false: operated from the command line only
+  bool plc_required = true;  ///< false: operated from the command line only
 
   std::string spool_dir = "/var/spool/weldcell";
-  std::string state_dir = "/var/lib/weldcell";   ///< control socket, job journal
-  std::string cad_cache_dir;        ///< default: state_dir/cad
-  bool projector_window = true;     ///< SDL window where a display is
+  std::string state_dir = "/var/lib/weldcell";  ///< control socket, job journal
+  std::string cad_cache_dir;                    ///< default: state_dir/cad
+  bool projector_window = true;                 ///< SDL window where a display is
   RealTime realtime = RealTime::Try;
 };
 

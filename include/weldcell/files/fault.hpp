@@ -8,8 +8,8 @@ namespace weldcell::files {
 
 struct Fault {
   std::string file;
-  int line = 0;        ///< 1-based; 0 = the whole file
-  std::string key;     ///< dotted, e.g. "inspection.pattern"
+  int line = 0;     ///< 1-based; 0 = the whole file
+  std::string key;  ///< dotted, e.g. "inspection.pattern"
   std::string what;
   std::string mend;
   /// "file:line: key: what: mend".
