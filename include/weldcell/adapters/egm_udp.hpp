@@ -66,7 +66,6 @@ class EgmSocket {
   EgmSocket() = default;
   Take take(std::span<std::byte> buffer, EgmArrival& out) noexcept;
   bool admits(const sockaddr_in& sender, HostTime arrival) noexcept;
-  bool wait_until(HostTime deadline) noexcept;
 
   Fd fd_;
   int port_ = 0;
