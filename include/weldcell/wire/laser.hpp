@@ -9,13 +9,20 @@
 
 namespace weldcell::wire {
 
+/// Words from here upwards are no distances but the sensor's reasons for having none.
+inline constexpr std::uint32_t kLaserFirstErrorCode = 0x7FFFFF00;
+
 /// One reading. Error codes of the sensor are kept as evidence.
 struct LaserReading {
-  float distance_mm = 0;            ///< 0 at the start of the measuring range; undefined when code != 0
-  std::uint32_t code = 0;           ///< 0 = valid, else the sensor's error word (0x7FFFFFF5..0x7FFFFFFB)
-  std::uint32_t counter = 0;        ///< running number of the reading, unwrapped modulo 2^32
-  std::uint32_t timestamp_us = 0;   ///< device clock; wraps; 0 when the stream has none
+  float distance_mm = 0;   ///< 0 at the start of the measuring range; undefined when code != 0
+  std::uint32_t code = 0;  ///< 0 = valid, else the sensor's error word (0x7FFFFF00..0x7FFFFFFF)
+  std::uint32_t counter =
+      0;  ///< running number of the reading, unwrapped modulo 2^32 from the first 24 bits seen
+  std::uint32_t timestamp_us = 0;  ///< device clock; wraps; 0 when the stream has none
 };
+
+/// What the sensor's error word means, for events and reports; "unknown" for others.
+const char* laser_code_text(std::uint32_t code);
 
 /// Which items a MEAS frame carries, in the sensor's fixed order. Must equal the sensor's output selection.
 struct Meas28Layout {
@@ -29,13 +36,21 @@ struct Meas28Layout {
 };
 
 struct LaserCounters {
-  std::uint64_t blocks = 0, readings = 0, lost_readings = 0, resyncs = 0, skipped_bytes = 0;
+  std::uint64_t blocks = 0;  ///< headers accepted
+  std::uint64_t readings = 0;
+  std::uint64_t lost_readings = 0;  ///< numbers that the running count jumped over
+  std::uint64_t resyncs = 0;        ///< times that the stream was not what the last header promised
+  std::uint64_t skipped_bytes = 0;  ///< bytes searched through for the next header
+  std::uint64_t restarts = 0;  ///< times that the sensor's count went backwards or leapt by more than 2^20
 };
 
 /// Stream decoder. feed() takes any split of the byte stream and calls sink(const LaserReading&) per reading.
+///
+/// A block whose running count contradicts itself or its header is dropped from there on. A layout with the
+/// counter loses only damaged blocks; without it, missing bytes can take the following block along.
 class Meas28Decoder {
  public:
-  explicit Meas28Decoder(Meas28Layout layout) : layout_(layout) {}
+  explicit Meas28Decoder(Meas28Layout layout) : layout_(layout), frame_bytes_(layout.frame_bytes()) {}
 
   template <typename Sink>
   void feed(std::span<const std::byte> bytes, Sink&& sink) {
@@ -46,25 +61,53 @@ class Meas28Decoder {
     }
   }
   const LaserCounters& counters() const { return counters_; }
+  /// Forgets stream and numbering, for a new connection; the counters go on.
   void reset();
 
  private:
+  enum class Step : std::uint8_t { NeedMore, Again, Reading };
+  struct Header {
+    std::uint16_t frames = 0;
+    std::uint32_t counter = 0;
+  };
+  /// Which of the two u16 of a header counts the frames; manuals disagree, so the stream decides.
+  enum class SizeOrder : std::uint8_t { Unknown, FramesFirst, BytesFirst };
+
   /// Copies what fits into the buffer and returns the rest.
   std::span<const std::byte> take(std::span<const std::byte> bytes) noexcept;
   bool next(LaserReading& out) noexcept;
+  Step search() noexcept;
+  Step take_header() noexcept;
+  Step take_frame(LaserReading& out) noexcept;
+  /// Needs 28 bytes at the place. True when they are a header of this layout.
+  bool read_header(std::size_t at, Header& out) noexcept;
+  bool accept_number(std::uint32_t word, std::uint32_t& number) noexcept;
+  std::uint32_t unwrap(std::uint32_t number, std::uint32_t mask) noexcept;
+  void lose_sync() noexcept;
+  void consume(std::size_t bytes) noexcept;
 
   Meas28Layout layout_;
+  std::size_t frame_bytes_;
   LaserCounters counters_;
   std::array<std::byte, 4096> buffer_{};
   std::size_t begin_ = 0, end_ = 0;
+  std::size_t last_item_ = 0;  ///< where the header or frame before begin_ starts: the way back
+  bool searching_ = false;
+  SizeOrder size_order_ = SizeOrder::Unknown;
+  Header block_;
   std::uint16_t frames_left_ = 0;
   std::uint32_t next_counter_ = 0;
-  bool seen_block_ = false;
+  bool numbering_ = false;    ///< next_counter_ is known
+  std::uint32_t offset_ = 0;  ///< frame count minus header count, modulo 2^24
+  std::uint32_t rival_offset_ = 0;
+  bool offset_known_ = false, offset_confirmed_ = false, rival_known_ = false;
 };
 
-/// The sensor's side, for simulators and golden tests: one block of readings with the given order and serial number.
-/// Returns the bytes written, 0 when they do not fit.
-std::size_t encode_meas28(const Meas28Layout& layout, std::span<const LaserReading> readings, std::uint32_t order_number,
-                          std::uint32_t serial_number, std::span<std::byte> out) noexcept;
+/// The sensor's side, for simulators and golden tests: one block of readings with the given order and serial
+/// number. Frame count before frame size; the header's counter is the first reading's. Returns the bytes
+/// written, 0 when they do not fit or there are none or more than 65535 readings.
+std::size_t encode_meas28(const Meas28Layout& layout, std::span<const LaserReading> readings,
+                          std::uint32_t order_number, std::uint32_t serial_number,
+                          std::span<std::byte> out) noexcept;
 
 }  // namespace weldcell::wire
