@@ -34,7 +34,7 @@ struct CertifyOptions {
 };
 
 /// Largest distance between neighbouring points of a certificate's path.
-inline constexpr double kPathStep_mm = 2.0;
+inline constexpr double kPathStepMm = 2.0;
 /// Two-sided 95 % of a normal distribution.
 inline constexpr double kSigmas95 = 1.959964;
 
