@@ -1,8 +1,10 @@
-// The Modbus register map: one table that makes the server, docs/PLC.md, the simulated PLC and the conformance test. Pure.
+// The Modbus register map: one table that makes the server, docs/PLC.md, the simulated PLC and the
+// conformance test. Pure.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -12,14 +14,34 @@ enum class WordOrder : std::uint8_t { Abcd, Cdab };
 
 /// PackML states and commands (ISA-TR88 numbers).
 enum class PackState : std::uint16_t {
-  Undefined = 0, Clearing = 1, Stopped = 2, Starting = 3, Idle = 4, Suspended = 5, Execute = 6, Stopping = 7,
-  Aborting = 8, Aborted = 9, Holding = 10, Held = 11, Unholding = 12, Suspending = 13, Unsuspending = 14,
-  Resetting = 15, Completing = 16, Complete = 17
+  Undefined = 0,
+  Clearing = 1,
+  Stopped = 2,
+  Starting = 3,
+  Idle = 4,
+  Suspended = 5,
+  Execute = 6,
+  Stopping = 7,
+  Aborting = 8,
+  Aborted = 9,
+  Holding = 10,
+  Held = 11,
+  Unholding = 12,
+  Suspending = 13,
+  Unsuspending = 14,
+  Resetting = 15,
+  Completing = 16,
+  Complete = 17
 };
 
 /// Commands of the PLC. A command counts once, when command_sequence changes.
 enum class PlcCommand : std::uint16_t {
-  None = 0, Reset = 1, Start = 2, Stop = 3, Abort = 8, Clear = 9,
+  None = 0,
+  Reset = 1,
+  Start = 2,
+  Stop = 3,
+  Abort = 8,
+  Clear = 9,
   Arm = 20,      ///< a person allows motion; needed at every start and after every fault
   Confirm = 21,  ///< the worker has placed what the projector shows
   Resume = 22    ///< go on with an interrupted job at its named step
@@ -40,6 +62,7 @@ inline constexpr std::uint16_t kPlcWriteBase = 0;
 inline constexpr std::uint16_t kPlcWriteWords = 10;
 inline constexpr std::uint16_t kPlcReadBase = 100;
 inline constexpr std::uint16_t kPlcReadWords = 40;
+inline constexpr std::uint16_t kPlcMapVersion = 1;  ///< +1 whenever a register moves or changes its meaning
 inline constexpr std::uint16_t kPlcTestWord = 0x1234;
 inline constexpr float kPlcTestReal = 123.456F;
 
@@ -60,17 +83,17 @@ struct PlcStatus {
   std::uint16_t command_ack = 0;     ///< echo of the sequence number taken
   std::uint16_t command_result = 0;  ///< 0 done, 1 refused in this state, 2 unknown command
   PackState state = PackState::Undefined;
-  std::uint16_t mode = 1;            ///< 1 production
-  std::uint16_t phase = 0;           ///< number of the job state, see docs/PLC.md
+  std::uint16_t mode = 1;   ///< 1 production
+  std::uint16_t phase = 0;  ///< number of the job state, see docs/PLC.md
   std::uint16_t armed = 0;
-  std::uint16_t guide_step = 0;      ///< 1-based; 0 = no guidance
-  std::uint16_t guide_member = 0;    ///< number of the member to place
+  std::uint16_t guide_step = 0;    ///< 1-based; 0 = no guidance
+  std::uint16_t guide_member = 0;  ///< number of the member to place
   std::uint16_t fault_code = 0;
   std::int32_t fault_detail = 0;
   std::int32_t job_number = 0;
   std::uint16_t progress_percent = 0;
   std::int32_t x_um = 0, y_um = 0, theta_mdeg = 0;
-  float worst_weld_margin_mm = 0;    ///< tolerance - bound of the worst weld
+  float worst_weld_margin_mm = 0;  ///< tolerance - bound of the worst weld
   std::uint16_t seams_done = 0;
 };
 
@@ -79,5 +102,12 @@ std::array<std::uint16_t, kPlcReadWords> encode_plc_status(const PlcStatus& stat
 /// The PLC's side of the two, for the simulated PLC and the conformance test.
 std::array<std::uint16_t, kPlcWriteWords> encode_plc_order(const PlcOrder& order, WordOrder words);
 PlcStatus decode_plc_status(std::span<const std::uint16_t, kPlcReadWords> words, WordOrder order);
+
+/// The order in which the test REAL reads 123.456; empty when it does in neither or the test word is not
+/// there.
+std::optional<WordOrder> find_word_order(std::span<const std::uint16_t, kPlcReadWords> words);
+
+/// The register, command and state tables of docs/PLC.md. A unit test holds the page to it.
+std::string plc_map_markdown();
 
 }  // namespace weldcell::wire
