@@ -1,0 +1,124 @@
+#include "device_time.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace weldcell::align {
+namespace {
+
+constexpr std::size_t kPeriodSample = 1001;
+constexpr double kStepToleranceNs = 2e6;  // stamps and numbers that part by more than this: one was stepped
+constexpr double kStepToleranceShare = 0.01;
+constexpr Nanoseconds kReorder = 100 * kMillisecond;
+constexpr Nanoseconds kRobotStep = kSecond;
+
+std::int32_t difference(std::uint32_t later, std::uint32_t earlier) {
+  return static_cast<std::int32_t>(later - earlier);
+}
+
+}  // namespace
+
+LaserClock::LaserClock(std::span<const StampedReading> readings, double rate_hz) : period_ns_(1e9 / rate_hz) {
+  std::vector<double> periods;
+  for (std::size_t i = 0; i < readings.size() && i < kPeriodSample; ++i) {
+    has_timestamp_ |= readings[i].reading.timestamp_us != 0;
+    if (i == 0) continue;
+    const auto& a = readings[i - 1].reading;
+    const auto& b = readings[i].reading;
+    const std::int32_t numbers = difference(b.counter, a.counter);
+    has_counter_ |= numbers != 0;
+    const std::int32_t stamps = difference(b.timestamp_us, a.timestamp_us);
+    if (numbers > 0 && stamps > 0) periods.push_back(1e3 * stamps / numbers);
+  }
+  if (has_timestamp_ && !periods.empty()) {
+    // The mean of the middle half: a median alone would keep the stamps' whole microseconds.
+    std::sort(periods.begin(), periods.end());
+    const std::size_t from = periods.size() / 4, to = periods.size() - from;
+    double sum = 0;
+    for (std::size_t i = from; i < to; ++i) sum += periods[i];
+    period_ns_ = sum / static_cast<double>(to - from);
+  }
+}
+
+DeviceStep LaserClock::step(const wire::LaserReading& reading) {
+  DeviceStep out;
+  const std::int32_t numbers = difference(reading.counter, last_counter_);
+  const std::int32_t stamps = difference(reading.timestamp_us, last_timestamp_us_);
+  last_counter_ = reading.counter;
+  last_timestamp_us_ = reading.timestamp_us;
+  if (first_) {
+    first_ = false;
+    device_ns_ = 0;
+    out.device_ns = device_ns_;
+    return out;
+  }
+  const double by_stamp = 1e3 * stamps, by_number = period_ns_ * numbers;
+  if (has_timestamp_ && stamps <= 0) out.restarted = true;
+  if (has_counter_ && numbers <= 0) out.restarted = true;
+  if (has_timestamp_ && has_counter_ &&
+      std::abs(by_stamp - by_number) > kStepToleranceNs + kStepToleranceShare * std::abs(by_number)) {
+    out.restarted = true;
+  }
+  if (out.restarted) {
+    device_ns_ = 0;
+  } else {
+    const double advance = has_timestamp_ ? by_stamp : (has_counter_ ? by_number : period_ns_);
+    device_ns_ += static_cast<std::int64_t>(std::llround(advance));
+    const double periods = has_counter_ ? numbers : std::round(by_stamp / period_ns_);
+    out.lost = static_cast<std::uint32_t>(std::max(0.0, periods - 1));
+  }
+  out.device_ns = device_ns_;
+  return out;
+}
+
+RobotClock::RobotClock(std::span<const StampedFeedback> poses) {
+  has_time_ = std::all_of(poses.begin(), poses.end(), [](const auto& p) { return p.feedback.time_us >= 0; });
+  if (has_time_ || poses.size() < 3) return;
+  seqno_zero_ = poses.front().feedback.seqno;
+  tm_zero_ms_ = poses.front().feedback.tm_ms;
+  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (const auto& p : poses) {
+    const double x = difference(p.feedback.seqno, seqno_zero_),
+                 y = 1e6 * difference(p.feedback.tm_ms, tm_zero_ms_);
+    n += 1, sx += x, sy += y, sxx += x * x, sxy += x * y;
+  }
+  const double determinant = n * sxx - sx * sx;
+  if (determinant <= 0) return;
+  const double slope = (n * sxy - sx * sy) / determinant, intercept = (sy - slope * sx) / n;
+  double worst = 0;
+  for (const auto& p : poses) {
+    const double x = difference(p.feedback.seqno, seqno_zero_),
+                 y = 1e6 * difference(p.feedback.tm_ms, tm_zero_ms_);
+    worst = std::max(worst, std::abs(y - intercept - slope * x));
+  }
+  if (slope > 0 && worst < 1.5e6) {
+    tm_period_ns_ = slope;
+    tm_zero_ns_ = intercept;
+  }
+}
+
+std::int64_t RobotClock::raw_ns(const wire::EgmFeedback& feedback) const {
+  if (has_time_) return feedback.time_us * kMicrosecond;
+  if (tm_period_ns_ > 0) {
+    return static_cast<std::int64_t>(
+        std::llround(tm_zero_ns_ + tm_period_ns_ * difference(feedback.seqno, seqno_zero_)));
+  }
+  return static_cast<std::int64_t>(difference(feedback.tm_ms, tm_zero_ms_)) * kMillisecond;
+}
+
+std::optional<DeviceStep> RobotClock::step(const StampedFeedback& pose) {
+  DeviceStep out;
+  out.device_ns = raw_ns(pose.feedback);
+  if (!first_) {
+    const Nanoseconds advance = out.device_ns - device_ns_;
+    if (advance <= 0 && advance > -kReorder) return std::nullopt;
+    out.restarted = advance < 0 || std::abs(advance - (pose.arrival.ns - arrival_ns_)) > kRobotStep;
+  }
+  first_ = false;
+  device_ns_ = out.device_ns;
+  arrival_ns_ = pose.arrival.ns;
+  return out;
+}
+
+}  // namespace weldcell::align

@@ -1,0 +1,54 @@
+// Unwraps the devices' own clocks into 64-bit nanoseconds and finds where a clock was reset or stepped. Pure.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "weldcell/align/aligner.hpp"
+
+namespace weldcell::align {
+
+/// What one message's clock says, relative to the message before.
+struct DeviceStep {
+  std::int64_t device_ns = 0;
+  std::uint32_t lost = 0;  ///< messages missing just before this one
+  bool restarted = false;  ///< the clock does not continue: a new mapping begins here
+};
+
+/// Laser: 32-bit microsecond stamps, or the reading's number over the rate when the stream carries no stamp.
+class LaserClock {
+ public:
+  /// Learns from the stream itself which clocks it carries and how long a period is; rate_hz is used without
+  /// stamps.
+  LaserClock(std::span<const StampedReading> readings, double rate_hz);
+  DeviceStep step(const wire::LaserReading& reading);
+  void rewind() { first_ = true; }
+  bool has_timestamp() const { return has_timestamp_; }
+
+ private:
+  bool has_timestamp_ = false, has_counter_ = false, first_ = true;
+  double period_ns_ = 0;
+  std::int64_t device_ns_ = 0;
+  std::uint32_t last_timestamp_us_ = 0, last_counter_ = 0;
+};
+
+/// Robot: feedBack.time (microseconds) when every message has it, else tm, whose whole milliseconds are
+/// smoothed with the sequence number.
+class RobotClock {
+ public:
+  explicit RobotClock(std::span<const StampedFeedback> poses);
+  /// nullopt: the message repeats or precedes an earlier one and is left out.
+  std::optional<DeviceStep> step(const StampedFeedback& pose);
+  void rewind() { first_ = true; }
+
+ private:
+  bool has_time_ = false, first_ = true;
+  double tm_zero_ns_ = 0, tm_period_ns_ = 0;  ///< 0: sequence and tm do not go together, tm is used as it is
+  std::uint32_t seqno_zero_ = 0, tm_zero_ms_ = 0;
+  std::int64_t device_ns_ = 0, arrival_ns_ = 0;
+
+  std::int64_t raw_ns(const wire::EgmFeedback& feedback) const;
+};
+
+}  // namespace weldcell::align
