@@ -25,7 +25,9 @@ struct ModbusOptions {
   int listen_fd = -1;  ///< a listening socket handed over by systemd; host and port then mean nothing
   std::vector<std::uint8_t> unit_ids{0, 1, 255};  ///< answered; others get exception 0x0B
   std::vector<std::string> allowed_clients;  ///< dotted IPv4; empty = every address that can reach the port
-  int max_clients = 8;                       ///< one more is closed at once
+  Nanoseconds idle_before_eviction =
+      10 * kSecond;     ///< with every place taken, a new client may push out one so long silent
+  int max_clients = 8;  ///< one more is closed at once, unless one is idle
   Nanoseconds half_frame_timeout =
       2 * kSecond;  ///< a frame begun and not ended for so long closes its connection
 };

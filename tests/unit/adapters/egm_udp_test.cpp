@@ -77,13 +77,18 @@ TEST(EgmSocket, StampIsOfTheKernelNotOfTheReading) {
   auto socket = EgmSocket::bind("127.0.0.1", 0);
   ASSERT_TRUE(socket.ok());
   const Sender robot(socket->port());
-  robot.send("early");
-  const HostTime sent = now();
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
   Received in;
-  const EgmArrival arrival = socket->receive(in.buffer, kSecond);
-  ASSERT_TRUE(arrival);
-  EXPECT_LE(arrival.arrival, sent + kMillisecond);
+  // Linux switches its stamps on some time after the option is set; until then it stamps at the reading.
+  Nanoseconds behind_sending = kSecond;
+  for (int i = 0; i < 20 && behind_sending > kMillisecond; ++i) {
+    robot.send("early");
+    const HostTime sent = now();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    const EgmArrival arrival = socket->receive(in.buffer, kSecond);
+    ASSERT_TRUE(arrival);
+    behind_sending = arrival.arrival - sent;
+  }
+  EXPECT_LE(behind_sending, kMillisecond);
 }
 
 TEST(EgmSocket, TimesOutEmpty) {

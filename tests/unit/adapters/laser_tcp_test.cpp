@@ -43,24 +43,26 @@ class Sensor {
   int port_ = 0;
 };
 
-TEST(LaserSocket, ReceivesWithAStampBeforeTheReading) {
+TEST(LaserSocket, ReceivesWithTheKernelsStamp) {
   Sensor sensor;
   auto link = LaserSocket::connect("127.0.0.1", sensor.port(), kSecond);
   ASSERT_TRUE(link.ok()) << link.error().text();
   sensor.accept();
-  const HostTime before = now();
-  sensor.send("MEAS");
-  const HostTime sent = now();
-  std::this_thread::sleep_for(std::chrono::milliseconds(30));
   std::array<std::byte, 64> buffer{};
-  const LaserArrival got = link->receive(buffer, kSecond);
-  ASSERT_EQ(got.event, LinkEvent::Data);
-  EXPECT_EQ(got.bytes, 4u);
-  EXPECT_GE(got.arrival, before - 50 * kMicrosecond);
-  RecordProperty("kernel_stamps", link->kernel_stamps() ? 1 : 0);
-  if (link->kernel_stamps()) {
-    EXPECT_LE(got.arrival, sent + kMillisecond);
+  Nanoseconds behind_sending = kSecond;
+  for (int i = 0; i < 20 && behind_sending > kMillisecond; ++i) {
+    const HostTime before = now();
+    sensor.send("MEAS");
+    const HostTime sent = now();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    const LaserArrival got = link->receive(buffer, kSecond);
+    ASSERT_EQ(got.event, LinkEvent::Data);
+    ASSERT_EQ(got.bytes, 4u);
+    ASSERT_GE(got.arrival, before - 50 * kMicrosecond);
+    behind_sending = got.arrival - sent;
   }
+  EXPECT_LE(behind_sending, kMillisecond);
+  EXPECT_TRUE(link->kernel_stamps());
   EXPECT_EQ(link->reason(), "");
 }
 
