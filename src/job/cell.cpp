@@ -56,6 +56,20 @@ Outputs Cell::step(const Input& input) {
   return std::exchange(out_, {});
 }
 
+CellMemory Cell::memory() const {
+  return {status_.state, status_.armed, status_.links, next_request_, last_sequence_, sequence_known_};
+}
+
+void Cell::recall(const CellMemory& memory) {
+  status_.state = memory.state;
+  status_.armed = memory.armed;
+  status_.links = memory.links;
+  next_request_ = memory.next_request;
+  last_sequence_ = memory.last_sequence;
+  sequence_known_ = memory.sequence_known;
+  refresh_plc();
+}
+
 bool Cell::wants_laser() const {
   return status_.state == State::PreparingScan || status_.state == State::Scanning;
 }

@@ -158,6 +158,16 @@ struct CellStatus {
   wire::PlcStatus plc;
 };
 
+/// What the cell carries from job to job. A record begins with it, so that replay starts from the same cell.
+struct CellMemory {
+  State state = State::Idle;
+  bool armed = false;
+  std::array<bool, kLinks> links{};
+  std::uint64_t next_request = 1;
+  std::uint16_t last_sequence = 0;
+  bool sequence_known = false;
+};
+
 /// Timeouts in which the world must answer. Virtual or real seconds.
 struct CellTimeouts {
   double egm_gap_s = 0.15;
@@ -174,6 +184,9 @@ class Cell {
   Outputs step(const Input& input);
 
   const CellStatus& status() const { return status_; }
+  CellMemory memory() const;
+  /// Before the first step only.
+  void recall(const CellMemory& memory);
   /// True while laser bytes are wanted; else the caller may keep them to itself.
   bool wants_laser() const;
   /// Fits a new job: nothing under way.

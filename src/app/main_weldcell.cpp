@@ -1,0 +1,65 @@
+// weldcell: the cell controller's core from the command line.
+#include <cstdio>
+#include <cstring>
+#include <exception>
+
+#include "app/commands.hpp"
+
+namespace {
+
+using weldcell::app::Arguments;
+
+struct Command {
+  const char* name;
+  int (*run)(Arguments);
+  const char* line;
+};
+
+constexpr Command kCommands[] = {
+    {"check", weldcell::app::command_check, "check cell, workpiece and job files: every fault with line and mend"},
+    {"import", weldcell::app::command_import, "STEP or DXF -> workpiece.yaml"},
+    {"plan", weldcell::app::command_plan, "what a job would do: guidance, scan, reach, times; no motion"},
+    {"localize", weldcell::app::command_localize, "edge points -> pose, covariance, verdict"},
+    {"trials", weldcell::app::command_trials, "seeded virtual jobs through the whole chain, in virtual time"},
+    {"replay", weldcell::app::command_replay, "run a record again and compare to the bit"},
+    {"review", weldcell::app::command_review, "a record as one self-contained page"},
+    {"dump", weldcell::app::command_dump, "a record's topic as CSV or JSON lines"},
+    {"arm", weldcell::app::command_arm, "joints <-> tool0 poses of an arm model, as CSV"},
+    {"submit", weldcell::app::command_submit, "drop a job into the spool"},
+    {"status", weldcell::app::command_status, "what the daemon does now"},
+    {"jobs", weldcell::app::command_jobs, "the jobs in the spool"},
+    {"show", weldcell::app::command_show, "one job: verdict, result, files"},
+    {"operate", weldcell::app::command_operate, "arm | start | confirm | stop | resume | reset | abort"},
+};
+
+int usage(std::FILE* to) {
+  std::fputs("usage: weldcell COMMAND [ARGUMENT...]     weldcell COMMAND --help\n\n", to);
+  for (const Command& command : kCommands) std::fprintf(to, "  %-10s %s\n", command.name, command.line);
+  std::fputs("\nexit codes: 0 done, 1 done but not accepted, 2 bad input or usage, 3 device or system fault\n", to);
+  return to == stdout ? 0 : 2;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) return usage(stderr);
+  if (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0 || std::strcmp(argv[1], "help") == 0) {
+    return usage(stdout);
+  }
+  if (std::strcmp(argv[1], "--version") == 0) {
+    std::puts("weldcell " WELDCELL_VERSION);
+    return 0;
+  }
+  try {
+    for (const Command& command : kCommands) {
+      if (std::strcmp(argv[1], command.name) == 0) {
+        return command.run(Arguments(const_cast<const char* const*>(argv) + 2, static_cast<std::size_t>(argc - 2)));
+      }
+    }
+  } catch (const std::exception& fault) {
+    std::fprintf(stderr, "weldcell %s: %s\n", argv[1], fault.what());
+    return 3;
+  }
+  std::fprintf(stderr, "weldcell: unknown command '%s'\n\n", argv[1]);
+  return usage(stderr);
+}

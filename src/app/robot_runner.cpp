@@ -1,0 +1,189 @@
+#include "weldcell/app/robot_runner.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "weldcell/base/units.hpp"
+
+namespace weldcell::app {
+
+namespace {
+
+constexpr Nanoseconds kPollInterval = 150 * kMillisecond;
+constexpr double kHaltTimeout = 5, kMoveTimeout = 60;
+constexpr const char* kResident = "WeldcellEgm";
+constexpr const char* kJobModule = "WeldcellJob";
+
+std::string jointtarget(const kinematics::Joints& q) {
+  return fmt::format("[[{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}],[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]]", deg(q[0]),
+                     deg(q[1]), deg(q[2]), deg(q[3]), deg(q[4]), deg(q[5]));
+}
+
+}  // namespace
+
+void RobotRunner::begin(const job::RobotRequest& request, HostTime now) {
+  request_ = request;
+  since_ = next_poll_ = now;
+  phase_ = request.task == job::RobotTask::Query ? Phase::Act : Phase::Halt;
+}
+
+std::optional<job::RobotReply> RobotRunner::step(HostTime now) {
+  if (phase_ == Phase::Idle || now < next_poll_) return std::nullopt;
+  next_poll_ = now + kPollInterval;
+  switch (phase_) {
+    case Phase::Idle: break;
+    case Phase::Halt: {
+      // Whatever runs belongs to an earlier request: stop it before anything is written.
+      const Status halted = halt();
+      if (!halted.ok()) return answer(halted);
+      phase_ = Phase::AwaitHalt;
+      break;
+    }
+    case Phase::AwaitHalt: {
+      const auto running = rws_->execution_state();
+      if (!running.ok()) return answer(running.error());
+      if (*running == adapters::ExecutionState::Stopped) {
+        if (request_.task == job::RobotTask::Stop) return answer(Done{});
+        phase_ = Phase::Act;
+        next_poll_ = now;
+      } else if (seconds(now - since_) > kHaltTimeout) {
+        return answer(Error{"robot.halt", "RAPID", "the program did not stop", "stop it on the FlexPendant"});
+      }
+      break;
+    }
+    case Phase::Act: {
+      if (request_.task == job::RobotTask::Query) {
+        phase_ = Phase::Idle;
+        return query();
+      }
+      const Status acted = act();
+      if (!acted.ok() || request_.task != job::RobotTask::Move) return answer(acted);
+      phase_ = Phase::AwaitEnd;
+      since_ = now;
+      break;
+    }
+    case Phase::AwaitEnd: {
+      const auto running = rws_->execution_state();
+      if (!running.ok()) return answer(running.error());
+      if (*running != adapters::ExecutionState::Stopped) {
+        if (seconds(now - since_) > kMoveTimeout) {
+          return answer(Error{"robot.move", "RAPID", "the move did not end within 60 s", "look at the FlexPendant"});
+        }
+        break;
+      }
+      const auto state = rws_->read_symbol(task_, kResident, "nWeldcellState");
+      if (!state.ok()) return answer(state.error());
+      if (*state != "2") {
+        return answer(Error{"robot.move", "RAPID", "the move stopped before its end: " + last_event_text(),
+                            "clear the cause, arm and resume"});
+      }
+      return answer(Done{});
+    }
+  }
+  return std::nullopt;
+}
+
+job::RobotReply RobotRunner::answer(const Status& status) {
+  phase_ = Phase::Idle;
+  if (!status.ok()) resident_checked_ = false;
+  job::RobotReply reply;
+  reply.id = request_.id;
+  reply.ok = status.ok();
+  if (!status.ok()) reply.text = status.error().text();
+  return reply;
+}
+
+Status RobotRunner::halt() {
+  const auto running = rws_->execution_state();
+  if (!running.ok()) return running.error();
+  if (*running == adapters::ExecutionState::Stopped) return Done{};
+  return rws_->stop();
+}
+
+Status RobotRunner::act() {
+  using job::RobotTask;
+  if (request_.task == RobotTask::Upload) {
+    if (auto s = rws_->upload_file("$home/WeldcellJob.mod", request_.module_text); !s.ok()) return s;
+    auto lease = rws_->lease(adapters::MastershipDomain::Rapid);
+    if (!lease.ok()) return lease.error();
+    if (auto s = rws_->load_module(task_, "$home/WeldcellJob.mod"); !s.ok()) return s;
+    return lease->release();
+  }
+  if (auto s = make_ready(); !s.ok()) return s;
+  switch (request_.task) {
+    case RobotTask::Move:
+      return run_routine(kResident, "WeldcellMove", kResident, "jWeldcellStart", jointtarget(request_.joints));
+    case RobotTask::OpenScan:
+      return run_routine(kResident, "WeldcellScan", kResident, "jWeldcellStart", jointtarget(request_.joints));
+    case RobotTask::Weld:
+      return run_routine(kJobModule, "WeldcellWeld", kJobModule, "nSeamsToSkip", std::to_string(request_.skip_seams));
+    default: return Done{};
+  }
+}
+
+Status RobotRunner::make_ready() {
+  const auto mode = rws_->operation_mode();
+  if (!mode.ok()) return mode.error();
+  if (*mode != adapters::OperationMode::Auto) {
+    return Error{"robot.mode", "robot controller", std::string("operation mode is ") + adapters::to_string(*mode),
+                 "turn the key to automatic and confirm on the FlexPendant"};
+  }
+  const auto state = rws_->controller_state();
+  if (!state.ok()) return state.error();
+  if (*state == adapters::ControllerState::MotorsOff) {
+    if (auto s = rws_->set_motors(true); !s.ok()) return s;
+  } else if (*state != adapters::ControllerState::MotorsOn) {
+    return Error{"robot.state", "robot controller", std::string("controller state is ") + adapters::to_string(*state),
+                 "release the emergency stop or close the guard, then arm and resume"};
+  }
+  return make_resident();
+}
+
+Status RobotRunner::make_resident() {
+  if (resident_checked_) return Done{};
+  const auto loaded = rws_->modules(task_);
+  if (!loaded.ok()) return loaded.error();
+  const bool there = std::find(loaded->begin(), loaded->end(), kResident) != loaded->end();
+  const auto text = rws_->download_file("$home/WeldcellEgm.mod");
+  if (!there || !text.ok() || *text != resident_) {
+    if (auto s = rws_->upload_file("$home/WeldcellEgm.mod", resident_); !s.ok()) return s;
+    auto lease = rws_->lease(adapters::MastershipDomain::Rapid);
+    if (!lease.ok()) return lease.error();
+    if (auto s = rws_->load_module(task_, "$home/WeldcellEgm.mod"); !s.ok()) return s;
+    if (auto s = lease->release(); !s.ok()) return s;
+  }
+  resident_checked_ = true;
+  return Done{};
+}
+
+Status RobotRunner::run_routine(const std::string& module, const std::string& routine, const std::string& symbol_module,
+                                const std::string& symbol, const std::string& literal) {
+  auto lease = rws_->lease(adapters::MastershipDomain::Rapid);
+  if (!lease.ok()) return lease.error();
+  if (auto s = rws_->write_symbol(task_, symbol_module, symbol, literal); !s.ok()) return s;
+  if (auto s = rws_->set_pp_to_routine(task_, module, routine); !s.ok()) return s;
+  if (auto s = lease->release(); !s.ok()) return s;
+  return rws_->start();
+}
+
+std::string RobotRunner::last_event_text() {
+  const auto events = rws_->event_log(1);
+  if (!events.ok() || events->empty()) return "no entry in the event log";
+  const auto& event = events->front();
+  return std::to_string(event.code) + " " + event.title;
+}
+
+job::RobotReply RobotRunner::query() {
+  const auto running = rws_->execution_state();
+  if (!running.ok()) return answer(running.error());
+  const auto seams = rws_->read_symbol(task_, kJobModule, "nSeamsDone");
+  if (!seams.ok()) return answer(seams.error());
+  job::RobotReply reply = answer(Done{});
+  reply.running = *running != adapters::ExecutionState::Stopped;
+  reply.seams_done = std::atoi(seams->c_str());
+  if (!reply.running) reply.text = last_event_text();
+  return reply;
+}
+
+}  // namespace weldcell::app
