@@ -87,7 +87,7 @@ std::variant<kinematics::ArmModel, Faults> parse_arm(std::string_view text, cons
     arm = read_arm(map);
   }
   top.finish();
-  if (!faults.empty()) return faults;
+  if (!faults.empty()) return in_order(std::move(faults));
   return arm;
 }
 

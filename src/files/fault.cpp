@@ -1,5 +1,8 @@
 #include "weldcell/files/fault.hpp"
 
+#include <algorithm>
+#include <tuple>
+
 namespace weldcell::files {
 
 std::string Fault::text() const {
@@ -9,6 +12,13 @@ std::string Fault::text() const {
     if (!part->empty()) out += (out.empty() ? "" : ": ") + *part;
   }
   return out;
+}
+
+Faults in_order(Faults faults) {
+  std::stable_sort(faults.begin(), faults.end(), [](const Fault& a, const Fault& b) {
+    return std::tie(a.file, a.line) < std::tie(b.file, b.line);
+  });
+  return faults;
 }
 
 std::string text(const Faults& faults) {

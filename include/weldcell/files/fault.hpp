@@ -17,6 +17,9 @@ struct Fault {
 };
 using Faults = std::vector<Fault>;
 
+/// By file, then line; faults of one line keep their order.
+Faults in_order(Faults faults);
+
 /// Every fault, one a line.
 std::string text(const Faults& faults);
 

@@ -1,0 +1,201 @@
+#include "files/cell_sections.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "weldcell/base/units.hpp"
+
+namespace weldcell::files {
+
+namespace {
+
+template <typename To, typename From>
+void read_mount_of(Map& map, Transform<To, From>& mount) {
+  const Node* node = map.node("mount", Need::Required);
+  if (node == nullptr) return;
+  Map inner(*node, map.file(), map.dotted("mount"), map.faults());
+  if (node->kind == Node::Kind::Map) read_mount(inner, mount.iso);
+}
+
+void read_frame(Map& map, wire::Meas28Layout& layout) {
+  const Node* list = map.sequence("frame");
+  if (list == nullptr) return;
+  wire::Meas28Layout read{false, false, false, false, false};
+  for (const Node& item : list->items) {
+    if (item.text == "exposure")
+      read.exposure = true;
+    else if (item.text == "counter")
+      read.counter = true;
+    else if (item.text == "timestamp")
+      read.timestamp = true;
+    else if (item.text == "intensity")
+      read.intensity = true;
+    else if (item.text == "status")
+      read.status = true;
+    else
+      map.fault("frame", item.describe() + " is no item of a reading",
+                "any of exposure, counter, timestamp, intensity, status");
+  }
+  layout = read;
+}
+
+}  // namespace
+
+bool read_endpoint(Map& map, const char* key, Endpoint& endpoint, bool zero_is_free) {
+  std::string text;
+  if (!map.text(key, text)) return false;
+  const std::size_t colon = text.rfind(':');
+  std::string host = colon == std::string::npos ? "" : text.substr(0, colon);
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
+    host = host.substr(1, host.size() - 2);
+  } else if (host.find(':') != std::string::npos) {
+    host.clear();
+  }
+  int port = -1;
+  if (colon != std::string::npos) {
+    const char* end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data() + colon + 1, end, port);
+    if (error != std::errc{} || rest != end) port = -1;
+  }
+  if (host.empty() || host.find_first_of(" /@") != std::string::npos || port < 0 || port > 65535) {
+    return map.fault(key, "'" + text + "' is no address", "write host:port, e.g. 127.0.0.1:6511");
+  }
+  if (port == 0 && !zero_is_free) return map.fault(key, "port 0 is nobody's", "write the device's port");
+  endpoint = {host, port};
+  return true;
+}
+
+void read_limits(Map& map, cell::MotionLimits& limits) {
+  map.number("joint_speed_fraction", limits.joint_speed_fraction, {0.01, 1});
+  map.joints_degrees("joint_acceleration_deg_s2", limits.joint_acceleration, {1, 20'000}, Need::Required);
+  map.joints_degrees("joint_jerk_deg_s3", limits.joint_jerk, {10, 1'000'000}, Need::Required);
+  map.number("line_acceleration_mm_s2", limits.line_acceleration_mm_s2, {10, 50'000});
+  map.number("line_jerk_mm_s3", limits.line_jerk_mm_s3, {100, 5'000'000});
+  map.degrees("margin_deg", limits.limit_margin_rad, {0, 20});
+  map.number("min_sin_j5", limits.min_sin_j5, {0.01, 0.9});
+  map.finish();
+}
+
+void read_egm(Map& map, CellConfig& config) {
+  read_endpoint(map, "listen", config.egm, true);
+  map.text("peer", config.egm_peer, Need::Optional, true);
+  map.number("cycle_ms", config.setup.egm.cycle_ms, {1, 100});
+  map.number("comm_timeout_s", config.setup.egm.comm_timeout_s, {0.02, 10});
+  map.number("max_speed_deviation_deg_s", config.setup.egm.max_speed_deviation_deg_s, {0.1, 1000});
+  map.finish();
+}
+
+void read_rws(Map& map, CellConfig& config) {
+  read_endpoint(map, "address", config.rws, true);
+  map.text("user", config.rws_user);
+  map.text("password_file", config.rws_password_file);
+  map.text("task", config.rws_task);
+  for (const char* key : {"password", "passwd", "secret"}) {
+    if (!map.has(key)) continue;
+    map.node(key);
+    map.fault(key, "a password must not stand in a cell file, every record keeps a copy of it",
+              "put it alone into a file with mode 0600 and write password_file: <path>");
+  }
+  map.finish();
+}
+
+void read_laser(Map& map, CellConfig& config) {
+  const std::size_t faults_before = map.faults().size();
+  cell::LaserSetup& laser = config.setup.laser;
+  static constexpr Choice<int> kDialects[] = {{"meas28", 0}};
+  int dialect = 0;
+  if (map.choice("dialect", dialect, kDialects)) config.laser_dialect = kDialects[dialect].word;
+  read_endpoint(map, "address", config.laser, true);
+  read_frame(map, config.laser_layout);
+  read_mount_of(map, laser.T_flange_laser);
+  map.number("start_of_range_mm", laser.start_of_range_mm, {0, 5000});
+  map.number("range_mm", laser.range_mm, {1, 5000});
+  map.number("rate_hz", laser.rate_hz, {50, 70'000});
+  map.number("latency_ms", laser.latency_ms, {-100, 500});
+  map.number("latency_sigma_ms", laser.latency_sigma_ms, {0, 100});
+  map.number("spot_mm", laser.spot_mm, {0.001, 20});
+  map.degrees("triangulation_deg", laser.triangulation_rad, {1, 80});
+  map.number("noise_mm", laser.noise_mm, {0, 10});
+  map.number("standoff_mm", laser.standoff_mm, {1, 10'000});
+  map.finish();
+  if (map.faults().size() != faults_before) return;
+  const double near_mm = laser.start_of_range_mm, far_mm = laser.start_of_range_mm + laser.range_mm;
+  if (laser.standoff_mm <= near_mm || laser.standoff_mm >= far_mm) {
+    map.fault("standoff_mm", fmt::format("{:g} is outside the measuring range", laser.standoff_mm),
+              fmt::format("between {:g} and {:g}, the start of the range and its end", near_mm, far_mm));
+  }
+}
+
+void read_projector(Map& map, CellConfig& config) {
+  cell::ProjectorSetup& projector = config.setup.projector;
+  read_mount_of(map, projector.T_flange_projector);
+  map.integer("width_px", projector.width_px, {16, 16'384});
+  map.integer("height_px", projector.height_px, {16, 16'384});
+  map.number("fx_px", projector.fx_px, {1, 100'000});
+  map.number("fy_px", projector.fy_px, {1, 100'000});
+  map.number("cx_px", projector.cx_px, {-20'000, 20'000});
+  map.number("cy_px", projector.cy_px, {-20'000, 20'000});
+  map.number("k1", projector.k1, {-2, 2});
+  map.number("k2", projector.k2, {-2, 2});
+  map.number("distance_mm", projector.distance_mm, {50, 5000});
+  map.boolean("window", config.projector_window);
+  map.finish();
+}
+
+void read_torch(Map& map, cell::TorchSetup& torch) {
+  read_mount_of(map, torch.T_flange_torch);
+  map.numbers("center_of_mass_mm", torch.center_of_mass_mm.data(), 3, {-2000, 2000});
+  map.number("mass_kg", torch.mass_kg, {0.01, 500});
+  map.finish();
+}
+
+void read_table(Map& map, cell::TableSetup& table) {
+  map.number("z_mm", table.z_mm, {-5000, 5000}, Need::Required);
+  const Node* node = map.node("area", Need::Required);
+  if (node != nullptr) {
+    Map area(*node, map.file(), map.dotted("area"), map.faults());
+    double x[2] = {0, 0}, y[2] = {0, 0};
+    const char* const mend = "write [smallest, greatest]";
+    if (area.numbers("x_mm", x, 2, {-10'000, 10'000}, Need::Required) && x[0] >= x[1])
+      area.fault("x_mm", "is empty", mend);
+    if (area.numbers("y_mm", y, 2, {-10'000, 10'000}, Need::Required) && y[0] >= y[1])
+      area.fault("y_mm", "is empty", mend);
+    area.finish();
+    table.area = {{x[0], y[0]}, {x[1], y[1]}};
+  }
+  map.finish();
+}
+
+void read_weld(Map& map, cell::WeldSetup& weld) {
+  map.number("speed_mm_s", weld.speed_mm_s, {0.1, 200});
+  map.number("approach_mm", weld.approach_mm, {1, 1000});
+  map.number("stick_out_mm", weld.stick_out_mm, {1, 100});
+  map.number("air_speed_mm_s", weld.air_speed_mm_s, {1, 5000});
+  if (map.text("torch_tool", weld.torch_tool)) {
+    bool good = weld.torch_tool.size() <= 32;
+    for (const char& c : weld.torch_tool) {
+      const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+      good = good && (letter || (&c != weld.torch_tool.data() && ((c >= '0' && c <= '9') || c == '_')));
+    }
+    if (!good)
+      map.fault("torch_tool", "is no RAPID name", "a letter, then letters, digits and _; at most 32");
+  }
+  map.finish();
+}
+
+void read_modbus(Map& map, CellConfig& config) {
+  read_endpoint(map, "listen", config.modbus, true);
+  static constexpr Choice<wire::WordOrder> kOrders[] = {{"abcd", wire::WordOrder::Abcd},
+                                                        {"cdab", wire::WordOrder::Cdab}};
+  map.choice("word_order", config.word_order, kOrders);
+  map.finish();
+}
+
+void read_plc(Map& map, CellConfig& config) {
+  map.boolean("required", config.plc_required);
+  map.number("heartbeat_timeout_s", config.plc_heartbeat_timeout_s, {0.1, 60});
+  map.finish();
+}
+
+}  // namespace weldcell::files

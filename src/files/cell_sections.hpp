@@ -1,0 +1,23 @@
+// The sections of a cell file, each read from its mapping into its struct. Pure but for the faults they add.
+#pragma once
+
+#include "weldcell/files/cell_file.hpp"
+#include "weldcell/files/schema.hpp"
+
+namespace weldcell::files {
+
+void read_limits(Map& map, cell::MotionLimits& limits);
+void read_egm(Map& map, CellConfig& config);
+void read_rws(Map& map, CellConfig& config);
+void read_laser(Map& map, CellConfig& config);
+void read_projector(Map& map, CellConfig& config);
+void read_torch(Map& map, cell::TorchSetup& torch);
+void read_table(Map& map, cell::TableSetup& table);
+void read_weld(Map& map, cell::WeldSetup& weld);
+void read_modbus(Map& map, CellConfig& config);
+void read_plc(Map& map, CellConfig& config);
+
+/// "host:port" or "[v6]:port"; port 0 = a free one where `zero_is_free`.
+bool read_endpoint(Map& map, const char* key, Endpoint& endpoint, bool zero_is_free);
+
+}  // namespace weldcell::files
