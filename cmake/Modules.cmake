@@ -32,7 +32,6 @@ function(weldcell_program NAME MODULE)
     target_link_libraries(${NAME} PRIVATE weldcell_${MODULE})
     target_include_directories(${NAME} PRIVATE ${CMAKE_SOURCE_DIR}/src)
     target_compile_options(${NAME} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Werror)
-    target_compile_definitions(${NAME} PRIVATE WELDCELL_VERSION="${PROJECT_VERSION}")
   endif()
 endfunction()
 
