@@ -1,0 +1,78 @@
+#include <fmt/format.h>
+
+#include "weldcell/guidance/drawing.hpp"
+
+namespace weldcell::guidance {
+
+namespace {
+
+/// The projector's own colours: bright on black, since black is no light.
+const char* css(Colour colour) {
+  switch (colour) {
+    case Colour::Place:
+      return "#3dff6e";
+    case Colour::Placed:
+      return "#5a7a62";
+    case Colour::Fixture:
+      return "#ffd23d";
+    case Colour::Text:
+      return "#ffffff";
+    case Colour::Warning:
+      return "#ff8a5c";
+  }
+  return "#ffffff";
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string drawing_svg(const Drawing& drawing) {
+  std::string out = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
+      "role=\"img\">",
+      drawing.width_px, drawing.height_px);
+  out += "<title>";
+  for (const PixelText& t : drawing.texts) out += escaped(t.text) + ". ";
+  out += "</title>";
+  out +=
+      fmt::format("<rect width=\"{}\" height=\"{}\" fill=\"#000000\"/>", drawing.width_px, drawing.height_px);
+  for (const PixelLine& line : drawing.lines) {
+    out += line.closed ? "<polygon points=\"" : "<polyline points=\"";
+    for (const Vec2& p : line.px) out += fmt::format("{:.1f},{:.1f} ", p.x(), p.y());
+    if (!line.px.empty()) out.pop_back();
+    out += fmt::format("\" fill=\"none\" stroke=\"{}\" stroke-width=\"{:g}\" stroke-linejoin=\"round\"/>",
+                       css(line.colour), line.width_px);
+  }
+  for (const PixelText& t : drawing.texts) {
+    out += fmt::format(
+        "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{:.1f}\" fill=\"{}\" text-anchor=\"middle\" "
+        "dominant-baseline=\"central\" "
+        "font-family=\"sans-serif\" font-weight=\"bold\">{}</text>",
+        t.px.x(), t.px.y(), t.height_px, css(t.colour), escaped(t.text));
+  }
+  return out + "</svg>";
+}
+
+}  // namespace weldcell::guidance
