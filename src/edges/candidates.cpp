@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kBin = 0.25;           // mm of travel
 constexpr std::size_t kWindowBins = 6;  // of each one-sided window
-constexpr double kDropout = 1.0;        // mm: shorter ones are bridged
+constexpr double kDropout = 0.45;       // mm: shorter ones are bridged
 constexpr double kMostlyInvalid = 0.3;  // share of valid readings below which a bin is dark
 constexpr double kBesideDropout = 1.2;  // mm: the step and the drop-out are one
 constexpr double kOvershoot = 0.8;      // mm beside a drop-out that the sensor distorts

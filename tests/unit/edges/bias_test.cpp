@@ -63,7 +63,8 @@ TEST(Shadow, LastUpperReadingCorrected) {
                                               {40.0, 4.0, 0.3},
                                               {40.0, 4.0, 0.2},
 
-                                              {10.0, 0.0, 0.349}}) {
+                                              {10.0, 0.0, 0.349},
+                                              {5.0, 0.0, 0.349}}) {
     for (const bool peak : {false, true}) {
       for (const int receiver : {1, -1}) {
         StepProfile p;
