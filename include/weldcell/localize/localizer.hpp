@@ -1,0 +1,36 @@
+// A template made ready once for many localizations: distance fields and edge lists over the part's plane.
+// Pure.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "weldcell/localize/localize.hpp"
+
+namespace weldcell::localize {
+
+class TemplateFields;
+
+/// Holds what does not depend on the scan (a few MB, built in milliseconds). localize() is const,
+/// deterministic and safe to call from several threads at once; its time does not grow with the number of
+/// members.
+class Localizer {
+ public:
+  explicit Localizer(workpiece::OutlineTemplate outline);
+  ~Localizer();
+  Localizer(Localizer&&) noexcept;
+  Localizer& operator=(Localizer&&) noexcept;
+
+  const workpiece::OutlineTemplate& outline() const { return *outline_; }
+  std::size_t memory_bytes() const;
+
+  /// As the free function localize(), without building the fields anew.
+  Localization localize(std::span<const EdgePoint> edges, std::span<const PathPiece> path,
+                        const LocalizeOptions& options) const;
+
+ private:
+  std::unique_ptr<workpiece::OutlineTemplate> outline_;
+  std::unique_ptr<TemplateFields> fields_;
+};
+
+}  // namespace weldcell::localize

@@ -1,0 +1,248 @@
+#include "decide.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "weldcell/base/units.hpp"
+#include "wording.hpp"
+
+namespace weldcell::localize {
+
+namespace {
+
+/// Odds of about 1000 : 1.
+constexpr double kAmbiguous_nats = 7;
+/// Another reading of the same points must be this much better to be named as the cause.
+constexpr double kClearly_nats = 15;
+constexpr double kDisplaced_nats = 14;
+constexpr double kMinInlierShare = 0.35;
+constexpr double kMinRate = 0.5;
+/// What a pose must be known to (two sigmas) when no weld says so more exactly.
+constexpr double kPoseBound_mm = 1.0;
+constexpr double kPoseBound_rad = rad(0.2);
+
+void say(Localization& result, Verdict verdict, const char* cause, std::string reason) {
+  result.verdict = verdict;
+  result.cause = cause;
+  result.reason = std::move(reason);
+}
+
+const std::string& member_name(const Situation& s, int member) {
+  return s.outline.member_names[static_cast<std::size_t>(member)];
+}
+
+/// Whether the found pose leaves anything to explain.
+bool suspicious(const Situation& s, const Localization& result) {
+  if (result.inliers < 0.6 * static_cast<double>(s.crossings.size())) return true;
+  if (!s.evidence.has_path) {
+    return std::any_of(s.fit.member_points.begin(), s.fit.member_points.end(), [](int n) { return n == 0; });
+  }
+  if (s.evidence.seen < 0.85 * s.evidence.expected) return true;
+  return std::any_of(s.evidence.members.begin(), s.evidence.members.end(),
+                     [](const MemberEvidence& m) { return m.expected >= 3 && m.seen < 0.6 * m.expected; });
+}
+
+/// The best fit of other crossings or another box, when it is clearly better than the found one.
+bool clearly_better(const Situation& s, const std::vector<Crossing>& crossings, const SearchBox& box,
+                    FitState* found) {
+  double best = -1e300;
+  const std::vector<Crossing> sample = sampled(crossings, 400);
+  const std::vector<Crossing> few = sampled(crossings, kSearchPoints);
+  for (const Mode& mode : search(s.fields, crossings, box, 8)) {
+    const FitState state = polish(s.fields, few, mode.pose, 12, nullptr);
+    const double likelihood = rough_log_likelihood(s.fields, sample, state);
+    if (likelihood <= best) continue;
+    best = likelihood;
+    *found = state;
+  }
+  return best > rough_log_likelihood(s.fields, sampled(s.crossings, 400), s.fit.state) + kClearly_nats;
+}
+
+std::vector<Crossing> mirrored(const std::vector<Crossing>& crossings, const Vec2& about) {
+  std::vector<Crossing> out = crossings;
+  for (Crossing& c : out) {
+    c.point.y() = 2 * about.y() - c.point.y();
+    c.direction.y() = -c.direction.y();
+    c.inward.y() = -c.inward.y();
+    c.inward_rad = -c.inward_rad;
+  }
+  return out;
+}
+
+bool is_mirrored(const Situation& s) {
+  SearchBox box{{s.options.planned * s.outline.centroid, 0}, s.options.range_mm, kPi};
+  FitState state;
+  return clearly_better(s, mirrored(s.crossings, box.planned.centre), box, &state);
+}
+
+bool lies_outside(const Situation& s, Localization& result) {
+  SearchBox box{{s.options.planned * s.outline.centroid, s.options.planned.theta_rad},
+                std::min(2.5 * s.options.range_mm + 50, 600.0),
+                kPi};
+  FitState state;
+  if (!clearly_better(s, s.crossings, box, &state)) return false;
+  const Vec2 off = state.pose.centre - box.planned.centre;
+  say(result, Verdict::Reject, "out_of_range",
+      fmt::format(
+          "The part lies {} and {} away from its planned place, outside the allowed range. Move it to the "
+          "projected outline and scan again.",
+          millimetres(off.norm()), degrees(wrap_pi(state.pose.theta_rad - box.planned.theta_rad))));
+  return true;
+}
+
+bool member_displaced(const Situation& s, Localization& result, const std::vector<int>& unseen) {
+  Displacement best;
+  best.gain = kDisplaced_nats;
+  const int members = static_cast<int>(s.evidence.members.size());
+  for (int m = 0; m < members; ++m) {
+    const bool hardly_seen = std::find(unseen.begin(), unseen.end(), m) != unseen.end();
+    const MemberEvidence& e = s.evidence.members[static_cast<std::size_t>(m)];
+    if (!hardly_seen && e.seen == e.expected) continue;
+    const Displacement d = find_displacement(s.fields, s.path, s.crossings, s.fit, s.evidence, m);
+    if (d.gain > best.gain) best = d;
+  }
+  if (best.member < 0) return false;
+  say(result, Verdict::Reject, "wrong_revision",
+      fmt::format(
+          "{} lies {} of its place on the drawing: another revision, or set up wrong. Check the part against "
+          "drawing {}.",
+          member_name(s, best.member), direction_on_drawing(best.shift), s.outline.name));
+  return true;
+}
+
+bool member_off(const Situation& s, Localization& result) {
+  for (std::size_t m = 0; m < result.members.size(); ++m) {
+    const MemberPose& pose = result.members[m];
+    if (pose.points < 2) continue;
+    const double off = std::hypot(pose.dx_mm, pose.dy_mm);
+    if (off <= s.options.max_member_shift_mm + 2 * std::min(pose.sigma_mm, 0.5)) continue;
+    const Vec2 on_drawing = Pose2{0, 0, -result.pose.theta_rad}.rotate({pose.dx_mm, pose.dy_mm});
+    say(result, Verdict::Reject, "wrong_revision",
+        fmt::format(
+            "{} lies {} of its place on the drawing, more than the allowed {}. Set it right or check the "
+            "revision of drawing {}.",
+            pose.name, direction_on_drawing(on_drawing), millimetres(s.options.max_member_shift_mm),
+            s.outline.name));
+    return true;
+  }
+  return false;
+}
+
+bool wrong_part(const Situation& s, Localization& result) {
+  const std::vector<int> unseen = unseen_members(s.evidence);
+  const bool doubtful = suspicious(s, result);
+  if (doubtful && is_mirrored(s)) {
+    say(result, Verdict::Reject, "mirrored",
+        fmt::format("The part is the mirror image of drawing {}. Turn it over or load the mirrored job.",
+                    s.outline.name));
+    return true;
+  }
+  if (doubtful && lies_outside(s, result)) return true;
+  if (s.evidence.has_path && member_displaced(s, result, unseen)) return true;
+  if (!unseen.empty()) {
+    say(result, Verdict::Rescan, "member_missing",
+        fmt::format(
+            "{} was not seen although the scan passed over its place. Put it in place and scan again.",
+            member_name(s, unseen.front())));
+    return true;
+  }
+  return member_off(s, result);
+}
+
+/// The edge whose crossing would tell most about the worst known direction.
+int most_telling_edge(const Situation& s, const Eigen::Matrix3d& covariance_part) {
+  int best = 0;
+  double gain = -1;
+  for (std::size_t e = 0; e < s.fields.edges().size(); ++e) {
+    const FieldEdge& edge = s.fields.edges()[e];
+    const Vec2 middle = edge.a + 0.5 * edge.length_mm * edge.direction;
+    const Vec2& n = edge.outward;
+    const Eigen::Vector3d a(n.x(), n.y(), n.y() * middle.x() - n.x() * middle.y());
+    const double here = a.dot(covariance_part * a) * std::min(1.0, edge.length_mm / 100);
+    if (here <= gain) continue;
+    gain = here;
+    best = static_cast<int>(e);
+  }
+  return best;
+}
+
+bool too_vague(const Situation& s, Localization& result) {
+  const Eigen::Matrix2d xy = result.covariance.topLeftCorner<2, 2>();
+  const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(xy).eigenvalues()(1);
+  const double sigma_rad = std::sqrt(result.covariance(2, 2));
+  const double bound_rad = std::max(kPoseBound_rad, 1.0 / std::max(s.outline.radius_mm, 1.0));
+  if (2 * std::sqrt(std::max(largest, 0.0)) <= kPoseBound_mm && 2.5 * sigma_rad <= bound_rad) return false;
+  const int edge = most_telling_edge(s, s.fit.covariance.topLeftCorner<3, 3>());
+  say(result, Verdict::Rescan, "not_enough",
+      fmt::format("Not enough was seen to place the part (known to {} and {}). Scan across the {} again.",
+                  millimetres(2 * std::sqrt(std::max(largest, 0.0))), degrees(2 * sigma_rad),
+                  edge_name(s.outline, edge)));
+  return true;
+}
+
+bool ambiguous(const Situation& s, Localization& result) {
+  for (const Rival& rival : s.rivals) {
+    if (rival.gap_nats >= kAmbiguous_nats) continue;
+    const double turn = wrap_pi(rival.fit.state.pose.theta_rad - s.fit.state.pose.theta_rad);
+    const double off = (rival.fit.state.pose.centre - s.fit.state.pose.centre).norm();
+    say(result, Verdict::Rescan, "ambiguous",
+        fmt::format(
+            "The part fits as well turned by {} and {} aside. Scan all members once more, or place it closer "
+            "to the projected outline.",
+            degrees(turn), millimetres(off)));
+    return true;
+  }
+  return false;
+}
+
+bool out_of_range(const Situation& s, Localization& result) {
+  const Offset off = offset_from_planned(s.outline, s.options.planned, result.pose);
+  const auto beyond = [](double value, double limit, double slack) {
+    return std::abs(value) > 1.02 * limit + slack;
+  };
+  if (!beyond(off.dx_mm, s.options.max_offset_mm, 0.5) && !beyond(off.dy_mm, s.options.max_offset_mm, 0.5) &&
+      !beyond(off.dtheta_rad, s.options.max_rotation_rad, rad(0.1))) {
+    return false;
+  }
+  say(result, Verdict::Reject, "out_of_range",
+      fmt::format("The part lies {} and {} away from its planned place; {} and {} are allowed. Move it to "
+                  "the projected "
+                  "outline and scan again.",
+                  millimetres(std::hypot(off.dx_mm, off.dy_mm)), degrees(off.dtheta_rad),
+                  millimetres(s.options.max_offset_mm), degrees(s.options.max_rotation_rad)));
+  return true;
+}
+
+}  // namespace
+
+double path_log_likelihood(const Evidence& evidence) {
+  if (!evidence.has_path) return 0;
+  // A crossing is missed with a chance of about one in twelve.
+  return -2.5 * (evidence.expected - evidence.seen);
+}
+
+void decide(const Situation& s, Localization& result) {
+  const auto total = static_cast<double>(s.crossings.size());
+  if (s.options.full_reject_checks && wrong_part(s, result)) return;
+  if (result.inliers < kMinInlierShare * total || (s.evidence.has_path && s.evidence.rate < kMinRate)) {
+    say(result, Verdict::Reject, "clutter",
+        fmt::format("Only {} of {} edge points lie on the part as drawn. Clear the table of other things, "
+                    "check that it "
+                    "is part {}, and scan again.",
+                    result.inliers, s.crossings.size(), s.outline.name));
+    return;
+  }
+  if (too_vague(s, result)) return;
+  if (s.options.full_reject_checks && ambiguous(s, result)) return;
+  if (out_of_range(s, result)) return;
+  say(result, Verdict::Weld, "ok",
+      fmt::format("The part was found with {} of {} edge points; its place is known to {} and {}.",
+                  result.inliers, s.crossings.size(),
+                  millimetres(2 * std::sqrt(std::max(result.covariance(0, 0), result.covariance(1, 1)))),
+                  fmt::format("{:.3f} deg", deg(2 * std::sqrt(result.covariance(2, 2))))));
+}
+
+}  // namespace weldcell::localize

@@ -1,0 +1,357 @@
+#include "fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "normal_equations.hpp"
+#include "weldcell/base/units.hpp"
+
+namespace weldcell::localize {
+
+namespace {
+
+/// A crossing along the edge itself says nothing about it; the slack covers a pose that is still turned a
+/// little wrong.
+constexpr double kAlongEdge = -0.03;
+/// Noise, a shifted member and latency let a true crossing lie this far past the end of its edge.
+constexpr double kPastEnd_mm = 1.5;
+/// Latency before its prior is known to hold; 10 ms is the longest that a working cell shows.
+constexpr double kWideLatency_ms = 10;
+constexpr double kWideInset_mm = 3;
+/// Odds that a stated prior holds, before the points speak.
+constexpr double kPriorHolds_nats = 3;
+
+Row row_of(const TemplateFields& fields, const Crossing& crossing, const Match& m, const CentredPose& pose,
+           bool inset_everywhere) {
+  const FieldEdge& edge = fields.edges()[static_cast<std::size_t>(m.edge)];
+  const Vec2& n = edge.outward;
+  const double c = std::cos(pose.theta_rad), s = std::sin(pose.theta_rad);
+  const Vec2& d = crossing.direction;
+  const double across = n.x() * (c * d.x() + s * d.y()) + n.y() * (-s * d.x() + c * d.y());
+  Row row;
+  row.a = {n.x(), n.y(), n.y() * m.place.x() - n.x() * m.place.y()};
+  row.l = 1e-3 * crossing.speed_mm_s * across;
+  row.b = edge.round || inset_everywhere ? -1 : 0;
+  row.residual = m.residual_mm;
+  return row;
+}
+
+void move(CentredPose& pose, const Common& step) {
+  const double c = std::cos(pose.theta_rad), s = std::sin(pose.theta_rad);
+  pose.centre += Vec2(c * step(0) - s * step(1), s * step(0) + c * step(1));
+  pose.theta_rad = wrap_pi(pose.theta_rad + step(2));
+}
+
+bool any_speed(const std::vector<Crossing>& crossings) {
+  return std::any_of(crossings.begin(), crossings.end(), [](const Crossing& c) { return c.speed_mm_s > 0; });
+}
+
+/// What a row leaves when latency, inset and the member's shift are taken off.
+double net_residual(const TemplateFields& fields, const Row& row, const Match& m, const FitState& state) {
+  double net = row.residual - row.l * state.latency_ms - row.b * state.inset_mm;
+  if (!state.members.empty()) {
+    const FieldEdge& edge = fields.edges()[static_cast<std::size_t>(m.edge)];
+    const Vec2 arm = m.place - fields.member_centroids()[static_cast<std::size_t>(edge.member)];
+    const MemberShift& shift = state.members[static_cast<std::size_t>(edge.member)];
+    const Vec2& n = edge.outward;
+    net -= n.x() * shift.x() + n.y() * shift.y() + (n.y() * arm.x() - n.x() * arm.y()) * shift.z();
+  }
+  return net;
+}
+
+double squared_miss(double net, const Match& m) {
+  const double past = std::max(0.0, m.beyond_mm - kPastEnd_mm);
+  return net * net + past * past;
+}
+
+}  // namespace
+
+Match match(const TemplateFields& fields, const Crossing& crossing, const CentredPose& pose, double c,
+            double s) {
+  const Vec2 d = crossing.point - pose.centre;
+  Match out;
+  out.place = {c * d.x() + s * d.y(), -s * d.x() + c * d.y()};
+  const int bin = crossing.signed_step ? bin_of(crossing.inward_rad - pose.theta_rad) : kAnyBin;
+  const Vec2 inward(c * crossing.inward.x() + s * crossing.inward.y(),
+                    -s * crossing.inward.x() + c * crossing.inward.y());
+  double best = 1e300;
+  for (const std::uint16_t index : fields.near(bin, out.place)) {
+    const FieldEdge& edge = fields.edges()[index];
+    if (crossing.signed_step && -edge.outward.dot(inward) < kAlongEdge) continue;
+    const Vec2 from = out.place - edge.a;
+    const double along = from.dot(edge.direction), across = from.dot(edge.outward);
+    const double beyond = std::max({0.0, -along, along - edge.length_mm});
+    const double squared = across * across + beyond * beyond;
+    if (squared < best) {
+      best = squared;
+      out.edge = index;
+      out.residual_mm = across;
+      out.beyond_mm = beyond;
+    }
+  }
+  out.distance_mm = std::sqrt(best);
+  return out;
+}
+
+FitState polish(const TemplateFields& fields, const std::vector<Crossing>& crossings,
+                const CentredPose& start, double first_scale_mm, int* iterations) {
+  Priors priors;
+  priors.latency_ms = any_speed(crossings) ? kWideLatency_ms : 0;
+  priors.inset_mm = 0;
+  FitState state;
+  state.pose = start;
+  NormalEquations equations(fields.member_centroids(), priors);
+  double scale = first_scale_mm;
+  for (int step = 0; step < 12; ++step) {
+    const double c = std::cos(state.pose.theta_rad), s = std::sin(state.pose.theta_rad);
+    equations.clear();
+    for (const Crossing& crossing : crossings) {
+      const Match m = match(fields, crossing, state.pose, c, s);
+      if (m.edge < 0) continue;
+      const Row row = row_of(fields, crossing, m, state.pose, false);
+      const double miss = squared_miss(net_residual(fields, row, m, state), m);
+      const double ratio = 1 + miss / (scale * scale);
+      equations.add(fields.edges()[static_cast<std::size_t>(m.edge)].member, row, 1 / (ratio * ratio));
+    }
+    const Common step_found = equations.solve_rigid();
+    if (!step_found.allFinite()) break;
+    move(state.pose, step_found);
+    state.latency_ms = step_found(3);
+    if (iterations != nullptr) ++*iterations;
+    const double moved = step_found.head<2>().norm() + std::abs(step_found(2)) * fields.radius_mm();
+    if (scale <= 3 && moved < 0.05) break;
+    scale = std::max(3.0, scale * 0.7);
+  }
+  return state;
+}
+
+double rough_log_likelihood(const TemplateFields& fields, const std::vector<Crossing>& crossings,
+                            const FitState& state) {
+  const double c = std::cos(state.pose.theta_rad), s = std::sin(state.pose.theta_rad);
+  const double clutter = std::exp(-kInlierGate * kInlierGate / 2);
+  double sum = 0;
+  for (const Crossing& crossing : crossings) {
+    const Match m = match(fields, crossing, state.pose, c, s);
+    double good = 0;
+    if (m.edge >= 0) {
+      const Row row = row_of(fields, crossing, m, state.pose, false);
+      const double variance = 1 + crossing.sigma_mm * crossing.sigma_mm;
+      good = std::exp(-squared_miss(net_residual(fields, row, m, state), m) / (2 * variance));
+    }
+    sum += std::log(good + clutter);
+  }
+  return sum;
+}
+
+namespace {
+
+/// The loop of refine(): matches, weights, sums, solution, over and over.
+class Refinement {
+ public:
+  Refinement(const TemplateFields& fields, const std::vector<Crossing>& crossings, const FitState& start,
+             const Priors& priors)
+      : fields_(fields),
+        crossings_(crossings),
+        priors_(priors),
+        free_(fields.member_centroids().size(), false),
+        rows_(crossings.size()) {
+    fit_.state = start;
+    fit_.state.members.assign(free_.size(), MemberShift::Zero());
+    fit_.matches.resize(crossings.size());
+    fit_.residuals.assign(crossings.size(), 0);
+    fit_.inlier.assign(crossings.size(), 0);
+    if (!any_speed(crossings)) priors_.latency_ms = 0;
+  }
+
+  Fit run() {
+    find_members();
+    choose_priors();
+    for (int step = 0; step < 4; ++step) iterate(step);
+    finish();
+    return std::move(fit_);
+  }
+
+ private:
+  void place() {
+    const double c = std::cos(fit_.state.pose.theta_rad), s = std::sin(fit_.state.pose.theta_rad);
+    for (std::size_t i = 0; i < crossings_.size(); ++i) {
+      fit_.matches[i] = match(fields_, crossings_[i], fit_.state.pose, c, s);
+      if (fit_.matches[i].edge < 0) continue;
+      rows_[i] = row_of(fields_, crossings_[i], fit_.matches[i], fit_.state.pose, priors_.inset_everywhere);
+      fit_.residuals[i] = net_residual(fields_, rows_[i], fit_.matches[i], fit_.state);
+    }
+  }
+
+  int member_of(std::size_t i) const {
+    return fields_.edges()[static_cast<std::size_t>(fit_.matches[i].edge)].member;
+  }
+
+  void weigh_geman_mcclure(NormalEquations& equations, double scale) {
+    for (std::size_t i = 0; i < crossings_.size(); ++i) {
+      if (fit_.matches[i].edge < 0) continue;
+      const double ratio = 1 + squared_miss(fit_.residuals[i], fit_.matches[i]) / (scale * scale);
+      // Half a millimetre stands for what the stated sigma does not know at this stage.
+      const double variance = 0.25 + crossings_[i].sigma_mm * crossings_[i].sigma_mm;
+      equations.add(member_of(i), rows_[i], 1 / (ratio * ratio * variance));
+    }
+  }
+
+  void weigh_mixture(NormalEquations& equations) {
+    for (std::size_t i = 0; i < crossings_.size(); ++i) {
+      fit_.inlier[i] = 0;
+      if (fit_.matches[i].edge < 0) continue;
+      const double sigma = crossings_[i].sigma_mm * fit_.scale;
+      const double miss = squared_miss(fit_.residuals[i], fit_.matches[i]) / (sigma * sigma);
+      fit_.inlier[i] = 1 / (1 + std::exp(std::min(0.5 * (miss - kInlierGate * kInlierGate), 50.0)));
+      if (fit_.inlier[i] > 1e-6) equations.add(member_of(i), rows_[i], fit_.inlier[i] / (sigma * sigma));
+    }
+  }
+
+  /// Pose and members together with wide priors, so that a member some millimetres off keeps its points.
+  void find_members() {
+    Priors wide = priors_;
+    wide.latency_ms = priors_.latency_ms > 0 ? kWideLatency_ms : 0;
+    wide.member_shift_mm = 2;
+    wide.member_angle_rad = 0.01;
+    NormalEquations equations(fields_.member_centroids(), wide);
+    for (const double scale : {5.0, 3.0, 2.0}) {
+      place();
+      equations.clear();
+      weigh_geman_mcclure(equations, scale);
+      take(equations.solve(1, free_, true));
+    }
+    for (std::size_t m = 0; m < free_.size(); ++m) {
+      const MemberShift& u = fit_.state.members[m];
+      const double off = std::hypot(u.x(), u.y()) / std::max(priors_.member_shift_mm, 0.2);
+      const double turned = std::abs(u.z()) / std::max(priors_.member_angle_rad, 0.001);
+      free_[m] = off > kFarOff || turned > 2 * kFarOff;
+    }
+    measure_scale();
+  }
+
+  /// The median of the residuals says whether the stated sigmas can be believed.
+  void measure_scale() {
+    place();
+    std::vector<double> ratios;
+    for (std::size_t i = 0; i < crossings_.size(); ++i) {
+      if (fit_.matches[i].edge < 0) continue;
+      const double miss = std::sqrt(squared_miss(fit_.residuals[i], fit_.matches[i]));
+      if (miss < 6) ratios.push_back(miss / crossings_[i].sigma_mm);
+    }
+    if (ratios.size() < 4) return;
+    const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+    std::nth_element(ratios.begin(), middle, ratios.end());
+    fit_.scale = std::clamp(*middle / 0.6745, 1.0, 1e3);
+  }
+
+  /// A latency or an inset far outside its prior is real: then the prior gives way instead of bending the
+  /// pose. The evidence of the points decides, and it charges a wide prior for what it allows.
+  void choose_priors() {
+    place();
+    if (priors_.latency_ms > 0) {
+      Priors wide = priors_;
+      wide.latency_ms = kWideLatency_ms;
+      if (evidence_of(wide) > evidence_of(priors_) + kPriorHolds_nats) priors_ = wide;
+    }
+    if (priors_.inset_mm <= 0) return;
+    const bool any_round = std::any_of(fields_.edges().begin(), fields_.edges().end(),
+                                       [](const FieldEdge& e) { return e.round; });
+    Priors without = priors_, wide = priors_;
+    wide.inset_mm = kWideInset_mm;
+    wide.inset_everywhere = !any_round;
+    // Sharp edges in the drawing: an inset is only believed when the points insist on it.
+    if (!any_round) without.inset_mm = 0;
+    priors_ = evidence_of(wide) > evidence_of(without) + kPriorHolds_nats ? wide : without;
+  }
+
+  double evidence_of(const Priors& priors) {
+    NormalEquations equations(fields_.member_centroids(), priors);
+    for (std::size_t i = 0; i < crossings_.size(); ++i) {
+      if (fit_.matches[i].edge < 0) continue;
+      const double sigma = crossings_[i].sigma_mm * fit_.scale;
+      const double miss = squared_miss(fit_.residuals[i], fit_.matches[i]) / (sigma * sigma);
+      const double inlier = 1 / (1 + std::exp(std::min(0.5 * (miss - kInlierGate * kInlierGate), 50.0)));
+      if (inlier < 1e-6) continue;
+      const Row row =
+          row_of(fields_, crossings_[i], fit_.matches[i], fit_.state.pose, priors.inset_everywhere);
+      equations.add(member_of(i), row, inlier / (sigma * sigma));
+    }
+    return equations.solve_over_scales(free_).log_evidence;
+  }
+
+  void iterate(int step) {
+    place();
+    NormalEquations equations(fields_.member_centroids(), priors_);
+    weigh_mixture(equations);
+    take(equations.solve_over_scales(free_));
+    if (step == 1 || step == 2) rescale();
+  }
+
+  /// Residuals larger than stated widen everything; smaller ones are not believed.
+  void rescale() {
+    place();
+    double sum = 20, count = 20;
+    for (std::size_t i = 0; i < crossings_.size(); ++i) {
+      if (fit_.matches[i].edge < 0) continue;
+      const double ratio = fit_.residuals[i] / crossings_[i].sigma_mm;
+      sum += fit_.inlier[i] * ratio * ratio;
+      count += fit_.inlier[i];
+    }
+    fit_.scale = std::max(1.0, std::sqrt(sum / std::max(1.0, count - 5)));
+  }
+
+  void take(const Solution& solution) {
+    if (!solution.common.allFinite()) return;
+    move(fit_.state.pose, solution.common);
+    fit_.state.latency_ms = solution.common(3);
+    fit_.state.inset_mm = solution.common(4);
+    for (std::size_t m = 0; m < free_.size(); ++m) fit_.state.members[m] = solution.members[m].shift;
+    fit_.covariance = solution.covariance;
+    fit_.member_covariance.resize(free_.size());
+    for (std::size_t m = 0; m < free_.size(); ++m) fit_.member_covariance[m] = solution.members[m].covariance;
+    ++fit_.iterations;
+  }
+
+  void finish() {
+    place();
+    const double clutter = std::exp(-kInlierGate * kInlierGate / 2);
+    fit_.member_points.assign(free_.size(), 0);
+    for (std::size_t i = 0; i < crossings_.size(); ++i) {
+      double good = 0;
+      fit_.inlier[i] = 0;
+      if (fit_.matches[i].edge >= 0) {
+        const double sigma = crossings_[i].sigma_mm * fit_.scale;
+        good = std::exp(-0.5 * squared_miss(fit_.residuals[i], fit_.matches[i]) / (sigma * sigma));
+        fit_.inlier[i] = good / (good + clutter);
+        if (fit_.inlier[i] > 0.5) ++fit_.member_points[static_cast<std::size_t>(member_of(i))];
+      }
+      fit_.log_likelihood += std::log(good + clutter);
+    }
+    for (const MemberShift& u : fit_.state.members) {
+      const double shift = std::max(priors_.member_shift_mm, 0.1),
+                   angle = std::max(priors_.member_angle_rad, 0.0005);
+      // Twice the tolerance: about what the widest likely scale allows.
+      fit_.log_likelihood -=
+          0.5 * (u.head<2>().squaredNorm() / (4 * shift * shift) + u.z() * u.z() / (4 * angle * angle));
+    }
+  }
+
+  /// In units of the drawing's tolerance.
+  static constexpr double kFarOff = 4.5;
+
+  const TemplateFields& fields_;
+  const std::vector<Crossing>& crossings_;
+  Priors priors_;
+  std::vector<bool> free_;
+  std::vector<Row> rows_;
+  Fit fit_;
+};
+
+}  // namespace
+
+Fit refine(const TemplateFields& fields, const std::vector<Crossing>& crossings, const FitState& start,
+           const Priors& priors) {
+  return Refinement(fields, crossings, start, priors).run();
+}
+
+}  // namespace weldcell::localize
