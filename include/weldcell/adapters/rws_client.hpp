@@ -106,6 +106,7 @@ class RwsClient {
   Status upload_file(std::string_view path, std::string_view text);
   Result<std::string> download_file(std::string_view path);
   Status delete_file(std::string_view path);
+  Status make_folder(std::string_view parent, std::string_view name);
   /// Loads a module file into a task. Needs mastership of rapid and a stopped program.
   Status load_module(std::string_view task, std::string_view path, bool replace = true);
   Status unload_module(std::string_view task, std::string_view module);

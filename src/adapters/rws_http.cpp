@@ -1,0 +1,197 @@
+#include "weldcell/adapters/rws_http.hpp"
+
+#include <Poco/Exception.h>
+#include <Poco/Net/HTTPAuthenticationParams.h>
+#include <Poco/Net/HTTPClientSession.h>
+#include <Poco/Net/HTTPCredentials.h>
+#include <Poco/Net/HTTPDigestCredentials.h>
+#include <Poco/Net/HTTPMessage.h>
+#include <Poco/Net/HTTPRequest.h>
+#include <Poco/Net/HTTPResponse.h>
+#include <Poco/Net/NetException.h>
+
+#include <algorithm>
+#include <array>
+#include <istream>
+#include <optional>
+#include <ostream>
+#include <thread>
+#include <utility>
+
+#include "weldcell/adapters/host_clock.hpp"
+
+namespace weldcell::adapters {
+namespace {
+
+using Poco::Net::HTTPRequest;
+using Poco::Net::HTTPResponse;
+
+constexpr std::size_t kMostBodyBytes = 16u << 20;
+constexpr Nanoseconds kLogoutTimeout = kSecond;
+
+Poco::Timespan span(Nanoseconds ns) { return {ns / kSecond, static_cast<long>(ns % kSecond / kMicrosecond)}; }
+
+/// "name=value; path=/; httponly" -> {name, value}.
+std::optional<std::pair<std::string, std::string>> parse_cookie(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) return std::nullopt;
+  const std::size_t end = std::min(text.find(';'), text.size());
+  if (end < equals) return std::nullopt;
+  return std::pair(text.substr(0, equals), text.substr(equals + 1, end - equals - 1));
+}
+
+}  // namespace
+
+struct RwsHttp::State {
+  explicit State(RwsAccess a)
+      : access(std::move(a)),
+        digest(access.user, access.password),
+        place("rws " + access.host + ":" + std::to_string(access.port)) {}
+
+  RwsAccess access;
+  Poco::Net::HTTPDigestCredentials digest;
+  std::string place;
+  std::unique_ptr<Poco::Net::HTTPClientSession> session;
+  bool has_nonce = false;
+  bool fresh_connection = true;
+  std::map<std::string, std::string> cookies;
+  HostTime last_start{-kSecond};
+  RwsHttpCounters counters;
+
+  Error fault(const char* code, const std::string& what, const char* mend) const {
+    return {code, place, what, mend};
+  }
+  void connect();
+  void pace();
+  ports::HttpReply send_once(const ports::HttpRequest& request, HTTPResponse& response, HTTPRequest& wire);
+  void keep_cookies(const HTTPResponse& response);
+  std::optional<Error> answer_challenge(HTTPRequest& wire, const HTTPResponse& response);
+  Result<ports::HttpReply> exchange(const ports::HttpRequest& request);
+};
+
+void RwsHttp::State::connect() {
+  session =
+      std::make_unique<Poco::Net::HTTPClientSession>(access.host, static_cast<Poco::UInt16>(access.port));
+  session->setKeepAlive(true);
+  session->setTimeout(span(access.timeout), span(access.timeout), span(access.timeout));
+  fresh_connection = true;
+}
+
+void RwsHttp::State::pace() {
+  const Nanoseconds wait = last_start + access.least_interval - now();
+  if (wait > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(wait));
+  last_start = now();
+}
+
+void RwsHttp::State::keep_cookies(const HTTPResponse& response) {
+  for (auto header = response.find("Set-Cookie");
+       header != response.end() && Poco::icompare(header->first, "Set-Cookie") == 0; ++header) {
+    if (auto cookie = parse_cookie(header->second)) cookies[cookie->first] = cookie->second;
+  }
+}
+
+ports::HttpReply RwsHttp::State::send_once(const ports::HttpRequest& request, HTTPResponse& response,
+                                           HTTPRequest& wire) {
+  if (!request.body.empty() || request.method == "POST" || request.method == "PUT") {
+    wire.setContentType(request.content_type);
+    wire.setContentLength64(static_cast<Poco::Int64>(request.body.size()));
+  }
+  std::string line;
+  for (const auto& [name, value] : cookies) line += (line.empty() ? "" : "; ") + name + "=" + value;
+  if (!line.empty()) wire.set("Cookie", line);
+  pace();
+  ++counters.requests;
+  const HostTime deadline = now() + 4 * access.timeout;
+  session->sendRequest(wire) << request.body << std::flush;
+  std::istream& in = session->receiveResponse(response);
+  ports::HttpReply reply;
+  std::array<char, 16384> piece;
+  while (in.read(piece.data(), piece.size()), in.gcount() > 0) {
+    reply.body.append(piece.data(), static_cast<std::size_t>(in.gcount()));
+    if (reply.body.size() > kMostBodyBytes) throw Poco::DataException("the body is larger than 16 MB");
+    if (now() > deadline) throw Poco::TimeoutException("the body does not end");
+  }
+  reply.status = response.getStatus();
+  for (const auto& [name, value] : response) reply.headers[name] = value;
+  keep_cookies(response);
+  return reply;
+}
+
+std::optional<Error> RwsHttp::State::answer_challenge(HTTPRequest& wire, const HTTPResponse& response) {
+  for (const auto& [name, value] : response) {
+    if (Poco::icompare(name, "WWW-Authenticate") != 0) continue;
+    if (!Poco::Net::HTTPCredentials::isDigestCredentials(value)) continue;
+    digest.authenticate(wire, Poco::Net::HTTPAuthenticationParams(value.substr(7)));
+    has_nonce = true;
+    ++counters.challenges;
+    return std::nullopt;
+  }
+  return fault("http.refused", "the controller asks for another authentication than digest",
+               "this is no RWS 1.0 (IRC5, RobotWare 6): check rws.host and rws.port");
+}
+
+Result<ports::HttpReply> RwsHttp::State::exchange(const ports::HttpRequest& request) {
+  bool challenged = false, reconnected = false;
+  std::optional<HTTPResponse> challenge;
+  for (;;) {
+    const bool kept = session && !fresh_connection;
+    try {
+      if (!session) connect();
+      HTTPRequest wire(request.method, request.path, HTTPRequest::HTTP_1_1);
+      if (challenge) {
+        if (auto error = answer_challenge(wire, *challenge)) return *error;
+        challenge.reset();
+      } else if (has_nonce) {
+        digest.updateAuthInfo(wire);
+      }
+      HTTPResponse response;
+      ports::HttpReply reply = send_once(request, response, wire);
+      fresh_connection = false;
+      if (reply.status == HTTPResponse::HTTP_UNAUTHORIZED) {
+        if (challenged)
+          return fault("http.refused", "user '" + access.user + "' or its password is not accepted",
+                       "correct rws.user and the credential rws-password; the user needs the grants of "
+                       "docs/COMMISSIONING.md");
+        challenged = true;
+        challenge = response;
+        continue;
+      }
+      if (reply.status == HTTPResponse::HTTP_SERVICE_UNAVAILABLE) ++counters.overloads;
+      return reply;
+    } catch (const Poco::TimeoutException&) {
+      session.reset();
+      return fault("http.timeout", "no answer to " + request.method + " " + request.path,
+                   "check controller and network");
+    } catch (const Poco::Exception& e) {
+      session.reset();
+      if (kept && request.method == "GET" && !reconnected) {
+        reconnected = true;
+        ++counters.reconnects;
+        continue;
+      }
+      return fault("http.unreachable", request.method + " " + request.path + ": " + e.displayText(),
+                   "check that the controller runs, and rws.host and rws.port");
+    }
+  }
+}
+
+RwsHttp::RwsHttp(RwsAccess access) : state_(std::make_unique<State>(std::move(access))) {}
+RwsHttp::~RwsHttp() { logout(); }
+
+Result<ports::HttpReply> RwsHttp::exchange(const ports::HttpRequest& request) {
+  return state_->exchange(request);
+}
+const RwsHttpCounters& RwsHttp::counters() const { return state_->counters; }
+
+void RwsHttp::logout() {
+  State& s = *state_;
+  if (s.cookies.empty()) return;
+  const Nanoseconds usual = std::exchange(s.access.timeout, std::min(s.access.timeout, kLogoutTimeout));
+  s.session.reset();
+  static_cast<void>(s.exchange({"GET", "/logout", "", ""}));
+  s.access.timeout = usual;
+  s.cookies.clear();
+  s.session.reset();
+}
+
+}  // namespace weldcell::adapters
