@@ -21,9 +21,15 @@ struct Located {
 Located locate_by_model(const Run& run, const Candidate& candidate, double from_mm, double to_mm,
                         const EdgeOptions& options, EdgeSummary& summary);
 
-/// Cosine between the travel's direction towards the upper side and the receiver's: above 0 the step can
-/// throw a shadow.
-double receiver_cosine(const Run& run, const Candidate& candidate);
+/// How the beam crosses the edge, as far as it is known.
+struct Crossing {
+  bool normal_known = false;
+  double square = 1;   ///< |cosine| between travel and the edge's normal; 1 when unknown
+  double towards = 0;  ///< cosine between the receiver and the normal that points to the upper side
+  double hidden_mm =
+      0;  ///< length of the height's shadow along the travel; 0 when the receiver sees the foot
+};
+Crossing crossing_of(const Run& run, const Candidate& candidate, const EdgeOptions& options);
 
 /// Whether the candidate's drop-out has the direction and about the length of the height's shadow.
 bool is_shadow(const Run& run, const Candidate& candidate, const EdgeOptions& options);

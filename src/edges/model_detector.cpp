@@ -15,6 +15,7 @@ constexpr double kWidestBlur = 4.0;    // times the expected: a ramp, not a step
 constexpr double kMostOutliers = 0.35;
 constexpr double kMostChi2 = 9.0;
 constexpr double kWidestBracket = 2.0;  // mm without a reading at the step
+constexpr double kDarkens = 3.1;        // times the blur: a shorter shadow leaves no reading without light
 constexpr double kFarthest = 1.5;       // mm between candidate and fit
 
 /// Valid readings around the candidate, u towards the upper side, close ones averaged without their strays.
@@ -131,6 +132,27 @@ bool height_fits(double height_mm, const EdgeOptions& options) {
   return std::abs(height_mm - options.height_mm) <= options.height_tolerance * options.height_mm;
 }
 
+namespace {
+
+/// A shadow that ends before the spot has left the upper side darkens no reading, but moves the crossing
+/// outwards by half its length.
+void correct_short_shadow(const Run& run, const Candidate& c, const EdgeOptions& options, Located& located) {
+  const Crossing crossing = crossing_of(run, c, options);
+  const double longest = kDarkens * expected_blur(options) / crossing.square;
+  if (crossing.hidden_mm <= longest + 0.5) {
+    located.s_mm += c.step * 0.5 * crossing.hidden_mm;
+    located.sigma_mm = std::hypot(located.sigma_mm, 0.05 * crossing.hidden_mm);
+  }
+  if (!crossing.normal_known) {
+    // One side of a bar crossed obliquely may have such a shadow, uniform up to the longest; the other has
+    // none.
+    const double shift = 0.5 * std::min(longest, options.height_mm * std::tan(options.triangulation_rad));
+    located.sigma_mm = std::hypot(located.sigma_mm, shift / std::sqrt(24.0));
+  }
+}
+
+}  // namespace
+
 Located locate_by_model(const Run& run, const Candidate& c, double from_mm, double to_mm,
                         const EdgeOptions& options, EdgeSummary& summary) {
   Located out;
@@ -149,7 +171,9 @@ Located locate_by_model(const Run& run, const Candidate& c, double from_mm, doub
       ++summary.bad_height;
       return out;
     }
-    return {true, jump.s_mm, jump.bracket_mm / std::sqrt(12.0), jump.high_mm, jump.low_mm, false};
+    out = {true, jump.s_mm, jump.bracket_mm / std::sqrt(12.0), jump.high_mm, jump.low_mm, false};
+    correct_short_shadow(run, c, options, out);
+    return out;
   }
   const auto fit_with_reach = [&](double reach) {
     return fit_within(run, c, std::max(from_mm, c.s_mm - reach), std::min(to_mm, c.s_mm + reach), options);
@@ -169,6 +193,7 @@ Located locate_by_model(const Run& run, const Candidate& c, double from_mm, doub
   out.sigma_mm = fit.sigma_mm * std::sqrt(std::max(1.0, fit.chi2));
   out.top_mm = fit.model.high_mm + fit.model.slope * fit.model.position_mm;
   out.table_mm = fit.model.low_mm + fit.model.slope * fit.model.position_mm;
+  correct_short_shadow(run, c, options, out);
   return out;
 }
 

@@ -7,8 +7,11 @@
 namespace weldcell::edges {
 namespace {
 
-constexpr double kIsland = 0.3;        // mm of drop-out that ends the upper side
-constexpr double kLeastCosine = 0.25;  // receiver's direction along the travel, towards the upper side
+constexpr double kIsland = 0.3;          // mm of drop-out that ends the upper side
+constexpr double kSurelyTowards = 0.25;  // cosine beyond which even a short drop-out is a shadow
+constexpr double kSurelyAway = -0.6;     // cosine below which no oblique edge throws one, its normal unknown
+constexpr int kExposureReadings = 5;  // that the sensor's exposure control may lose at a change of brightness
+constexpr double kUnclear = 0.1;      // two normals whose cosines differ less cannot be told apart
 constexpr double kThresholdSpread =
     0.5;  // of the blur: how well light_threshold is known (2 % .. 15 % of the light)
 constexpr double kRoundingFrom = 0.9,
@@ -61,7 +64,7 @@ UpperEnd upper_end(const Run& run, const Candidate& c, double half_mm) {
 
 /// Radius of the quarter circle whose silhouette lies at s_mm, 0 when the corner is sharp. Least squares over
 /// a grid.
-double corner_radius(const Run& run, const Candidate& c, double s_mm, double noise_mm) {
+double corner_radius(const Run& run, const Candidate& c, double s_mm, double square, double noise_mm) {
   struct Sum {
     double inside, z;
   };
@@ -71,7 +74,7 @@ double corner_radius(const Run& run, const Candidate& c, double s_mm, double noi
   const std::size_t every = std::max<std::size_t>(1, (end - begin) / 200);
   for (std::size_t i = begin; i < end; i += every) {
     if (run.points[i].code != 0) continue;
-    samples.push_back({c.step * (run.s_mm[i] - s_mm), static_cast<double>(run.points[i].z_mm)});
+    samples.push_back({c.step * (run.s_mm[i] - s_mm) * square, static_cast<double>(run.points[i].z_mm)});
   }
   if (samples.size() < 8) return 0;
   double best = 0, best_cost = 0;
@@ -97,17 +100,42 @@ double corner_radius(const Run& run, const Candidate& c, double s_mm, double noi
 
 }  // namespace
 
-double receiver_cosine(const Run& run, const Candidate& c) {
+Crossing crossing_of(const Run& run, const Candidate& c, const EdgeOptions& options) {
   const align::SurfacePoint& p = run.points[std::min(index_at(run, c.s_mm), run.points.size() - 1)];
-  const float along = p.receiver_x * p.vx_mm_s + p.receiver_y * p.vy_mm_s;
-  return c.step * static_cast<double>(along) / speed_mm_s(p);
+  const Vec2 travel = Vec2(static_cast<double>(p.vx_mm_s), static_cast<double>(p.vy_mm_s)) / speed_mm_s(p);
+  const Vec2 receiver(static_cast<double>(p.receiver_x), static_cast<double>(p.receiver_y));
+  Crossing out;
+  Vec2 normal = travel;
+  double best = 0, second = 0;
+  for (const Vec2& n : options.normals) {
+    const double square = n.dot(travel);
+    if (std::abs(square) > best) {
+      // The same direction listed twice is no second opinion.
+      second = std::abs(n.dot(normal)) < 0.99 ? best : second;
+      best = std::abs(square);
+      normal = square > 0 ? n : Vec2(-n);
+    } else if (std::abs(n.dot(normal)) < 0.99) {
+      second = std::max(second, std::abs(square));
+    }
+  }
+  out.normal_known = best > 0.2 && best - second > kUnclear;
+  if (!out.normal_known) normal = travel;
+  out.square = normal.dot(travel);
+  out.towards = c.step * normal.dot(receiver);
+  out.hidden_mm =
+      options.height_mm * std::tan(options.triangulation_rad) * std::max(0.0, out.towards) / out.square;
+  return out;
 }
 
 bool is_shadow(const Run& run, const Candidate& c, const EdgeOptions& options) {
-  const double cosine = receiver_cosine(run, c);
-  const double expected = options.height_mm * std::tan(options.triangulation_rad) * cosine;
+  const Crossing crossing = crossing_of(run, c, options);
   const double seen = c.hidden.to_mm - c.hidden.from_mm;
-  return cosine >= kLeastCosine && seen >= 0.3 * expected - 1 && seen <= 2 * expected + 3;
+  const double longest = options.height_mm * std::tan(options.triangulation_rad) / crossing.square;
+  if (seen > 2 * longest + 3) return false;
+  if (crossing.towards >= kSurelyTowards) return seen >= 0.3 * crossing.hidden_mm - 1;
+  const auto readings = static_cast<int>(index_at(run, c.hidden.to_mm) - index_at(run, c.hidden.from_mm));
+  if (readings <= kExposureReadings) return false;
+  return crossing.towards > (crossing.normal_known ? 0.0 : kSurelyAway);
 }
 
 Located locate_by_shadow(const Run& run, const Candidate& c, const EdgeOptions& options,
@@ -123,14 +151,19 @@ Located locate_by_shadow(const Run& run, const Candidate& c, const EdgeOptions& 
     ++summary.bad_fit;
     return out;
   }
-  const double cosine = receiver_cosine(run, c);
+  const Crossing crossing = crossing_of(run, c, options);
   const double blur = options.spot_mm / 4;
-  const double overhang = -normal_quantile(options.light_threshold) * blur;
-  double s = end.last_mm + c.step * (overhang - 0.5 * end.spacing_mm);
-  const double radius = corner_radius(run, c, s, options.noise_mm);
-  // Where the corner is steeper than the line of sight the receiver sees nothing of it any more.
-  const double sight = std::atan(std::tan(options.triangulation_rad) * cosine);
-  const double hidden_corner = radius * (1 - std::cos(sight));
+  const double threshold = -normal_quantile(options.light_threshold);
+  double s = end.last_mm + c.step * (threshold * blur / crossing.square - 0.5 * end.spacing_mm);
+  const double radius = corner_radius(run, c, s, crossing.square, options.noise_mm);
+  // Where the corner is steeper than the line of sight the receiver sees nothing of it any more. An edge
+  // crossed obliquely, its normal unknown, tells the line of sight by how long the foot stays dark.
+  const double steepest = std::tan(options.triangulation_rad);
+  const double dark = c.hidden.to_mm - c.hidden.from_mm + 2 * threshold * blur;
+  const bool told = crossing.normal_known || crossing.towards >= kSurelyTowards;
+  const double slope =
+      told ? steepest * std::max(0.0, crossing.towards) : std::min(steepest, dark / options.height_mm);
+  const double hidden_corner = radius * (1 - std::cos(std::atan(slope))) / crossing.square;
   s -= c.step * hidden_corner;
   out.accepted = true;
   out.shadowed = true;

@@ -15,6 +15,7 @@
 
 #include "weldcell/align/aligner.hpp"
 #include "weldcell/geometry/edge_point.hpp"
+#include "weldcell/geometry/plane.hpp"
 
 namespace weldcell::edges {
 
@@ -27,9 +28,14 @@ struct EdgeOptions {
   double spot_mm = 1.1;            ///< beam diameter
   double noise_mm = 0.1;           ///< 1 sigma of one reading
   double triangulation_rad = 0.3;
-  double min_speed_mm_s = 20;     ///< slower stretches are not searched
-  double time_sigma_s = 20e-6;    ///< alignment noise, added to each edge's sigma as speed * time_sigma_s
-  double model_sigma_mm = 0.02;   ///< what the edge model itself may be wrong by, added to each edge's sigma
+  double min_speed_mm_s = 20;    ///< slower stretches are not searched
+  double time_sigma_s = 20e-6;   ///< alignment noise, added to each edge's sigma as speed * time_sigma_s
+  double model_sigma_mm = 0.02;  ///< what the edge model itself may be wrong by, added to each edge's sigma
+  /// Directions (Base, either sign) of the outline's normals where they are known, e.g. from a first
+  /// localization. The receiver sees a step's foot or not depending on the angle between it and the edge's
+  /// normal: with normals a shadow too short to darken a reading is corrected; without them each edge's sigma
+  /// allows for one.
+  std::vector<Vec2> normals;
   double light_threshold = 0.06;  ///< share of the spot's light below which the sensor reports an error code
 };
 

@@ -17,6 +17,7 @@ EdgeOptions options_for(const StepProfile& p) {
   o.noise_mm = p.noise_mm;
   o.triangulation_rad = p.triangulation_rad;
   o.light_threshold = p.threshold;
+  o.normals = {Vec2(1, 0)};
   return o;
 }
 
@@ -64,7 +65,10 @@ TEST(Shadow, LastUpperReadingCorrected) {
                                               {40.0, 4.0, 0.2},
 
                                               {10.0, 0.0, 0.349},
-                                              {5.0, 0.0, 0.349}}) {
+                                              {5.0, 0.0, 0.349},
+                                              {3.0, 0.0, 0.349},
+                                              {2.0, 0.0, 0.349},
+                                              {3.0, 0.0, 0.2}}) {
     for (const bool peak : {false, true}) {
       for (const int receiver : {1, -1}) {
         StepProfile p;
