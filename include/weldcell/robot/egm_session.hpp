@@ -1,5 +1,6 @@
-// One EGM cycle: datagram in, reply out. Follows a MotionPlan on the controller's clock, limits every reference, ramps
-// to rest when told or when in doubt. Real-time safe: no allocation, lock, log or exception; it counts.
+// One EGM cycle: datagram in, reply out. Follows a MotionPlan on the controller's clock, limits every
+// reference, ramps to rest when told or when in doubt. Real-time safe: no allocation, lock, log or exception;
+// it counts.
 #pragma once
 
 #include <array>
@@ -22,7 +23,13 @@ enum class EgmPhase : std::uint8_t {
 };
 
 enum class EgmRefusal : std::uint8_t {
-  None, NotAtStart, NotRunning, AlreadyFollowing, Disarmed
+  None,
+  NotAtStart,        ///< the robot or its held reference is farther than 0.2 deg from the first sample; or no
+                     ///< sample
+  NotRunning,        ///< motors off, motion control not running or RAPID stopped
+  AlreadyFollowing,  ///< another plan is being followed or ramped down
+  Disarmed,
+  Stopped  ///< request_stop() came between the offer and the next frame
 };
 const char* to_string(EgmRefusal);
 
@@ -30,25 +37,43 @@ const char* to_string(EgmRefusal);
 struct EgmReport {
   EgmPhase phase = EgmPhase::Waiting;
   EgmRefusal refusal = EgmRefusal::None;  ///< why the last plan offered was not begun
-  std::uint64_t plan_id = 0;         ///< being followed, or last followed
+  std::uint64_t plan_id = 0;              ///< being followed, or last followed
   double plan_time_s = 0;
-  bool plan_done = false;            ///< reached its end (not stopped before)
-  std::uint32_t session = 0;         ///< +1 at every session begin
-  std::uint32_t limited = 0;         ///< references that a limit cut
-  std::uint32_t malformed = 0;       ///< datagrams refused
-  std::uint32_t stale = 0;           ///< frames older than one already answered
+  bool plan_done = false;       ///< reached its end (not stopped before); false again when another begins
+  std::uint32_t session = 0;    ///< +1 at every session begin
+  std::uint32_t limited = 0;    ///< references (one axis in one cycle) that a limit cut
+  std::uint32_t malformed = 0;  ///< datagrams refused
+  std::uint32_t stale = 0;      ///< frames older than one already answered
 };
 
+/// A session begins with the first frame, when the controller's count or clock goes back, or after 0.5 s of
+/// silence: the reference is then where the robot is, and whatever was followed is dropped. A frame that is
+/// older than one already answered gets no answer. While the controller is not running EGM the reply repeats
+/// the measured joints.
+///
+/// Plan time advances by the controller's clock (feedBack.time, tm where that is absent), also across lost
+/// frames; after more than 0.1 s without a frame the motion ramps down instead of catching up. Every
+/// reference stays inside the joint range less its margin, the speed and the acceleration of the cell's
+/// limits; one that had to be cut is counted, and a reference that falls 0.5 deg behind its plan ramps down.
+/// The ramp goes straight on in joint space, all axes in step.
 class EgmSession {
  public:
+  /// The cell must state positive joint speeds and accelerations.
   explicit EgmSession(const cell::CellSetup& cell);
 
   /// Handles one datagram and writes the reply. Returns its size; 0 = no answer (malformed, stale).
-  std::size_t on_datagram(std::span<const std::byte> datagram, HostTime arrival, std::span<std::byte> reply) noexcept;
+  std::size_t on_datagram(std::span<const std::byte> datagram, HostTime arrival,
+                          std::span<std::byte> reply) noexcept;
 
-  /// Begins the plan at the next frame if armed, at rest, RUNNING and its first sample is where the robot is
-  /// (0.2 deg); else report().refusal tells why. The plan must outlive its use; the caller owns it.
+  /// Begins the plan at the next frame if armed, at rest, running and its first sample is where the robot is
+  /// (0.2 deg); else report().refusal tells why. What is left of the 0.2 deg fades out over the first 0.5 s.
+  /// Call on the thread that calls on_datagram(). The caller owns the plan and keeps it while uses() says so.
   void offer(const plan::MotionPlan* plan) noexcept;
+  /// True while the session may still read this plan: offered or followed. It is dropped before it ramps
+  /// down.
+  bool uses(const plan::MotionPlan* plan) const noexcept {
+    return plan != nullptr && (plan == plan_ || plan == offered_);
+  }
   /// From any thread: ramp to rest in the same cycle, drop the plan, stay so until the next offer.
   void request_stop() noexcept { stop_.store(true, std::memory_order_release); }
   /// From any thread: no plan is followed while disarmed; disarming ramps to rest.
@@ -58,12 +83,25 @@ class EgmSession {
   const wire::EgmFeedback& feedback() const { return feedback_; }
 
  private:
+  using Axes = std::array<double, 6>;
   struct Limits {
-    std::array<double, 6> lower_deg, upper_deg, speed_deg_s, acceleration_deg_s2;
+    Axes lower_deg, upper_deg, speed_deg_s, acceleration_deg_s2;
   };
-  void begin_session(const wire::EgmFeedback& f) noexcept;
+  enum class Arrival : std::uint8_t { Next, NewSession, Stale };
+
+  Arrival classify(const wire::EgmFeedback& f, HostTime arrival) const noexcept;
+  void begin_session() noexcept;
+  void step(double dt_s) noexcept;
+  double clock_step_s(const wire::EgmFeedback& f) const noexcept;
+  void hold_measured() noexcept;
+  /// True when the offered plan begins with this frame.
+  bool take_offer() noexcept;
+  EgmRefusal reason_to_refuse(const plan::MotionPlan& plan, bool stopped) const noexcept;
   void follow(double dt_s) noexcept;
-  void limit(double dt_s) noexcept;
+  void ramp_down(double dt_s) noexcept;
+  void drop_plan(EgmPhase next) noexcept;
+  /// The mean speed of this cycle that the limits allow for an axis that wants `speed`.
+  double allowed(std::size_t axis, double speed_deg_s, double dt_s) noexcept;
 
   Limits limits_;
   wire::EgmCodec codec_;
@@ -73,8 +111,13 @@ class EgmSession {
   const plan::MotionPlan* offered_ = nullptr;
   std::atomic<bool> stop_{false};
   std::atomic<bool> armed_{false};
-  std::array<double, 6> reference_deg_{};
-  std::array<double, 6> reference_speed_deg_s_{};
+  bool stopped_ = false;          ///< the stop bit as taken in this cycle
+  Axes reference_deg_{};          ///< as sent
+  Axes reference_speed_deg_s_{};  ///< as sent
+  Axes step_speed_deg_s_{};       ///< mean speed of the reference between the last two frames
+  Axes target_deg_{};             ///< the plan's point of the last frame; the reference unless a limit cut it
+  Axes offset_deg_{};             ///< held reference less first sample when the plan began
+  double last_dt_s_ = 0;
   std::uint32_t last_seqno_ = 0, last_tm_ms_ = 0, reply_seqno_ = 0;
   std::int64_t last_time_us_ = -1;
   HostTime last_arrival_;
