@@ -147,7 +147,7 @@ void correct_short_shadow(const Run& run, const Candidate& c, const EdgeOptions&
     // One side of a bar crossed obliquely may have such a shadow, uniform up to the longest; the other has
     // none.
     const double shift = 0.5 * std::min(longest, options.height_mm * std::tan(options.triangulation_rad));
-    located.sigma_mm = std::hypot(located.sigma_mm, shift / std::sqrt(24.0));
+    located.sigma_mm = std::hypot(located.sigma_mm, shift / std::sqrt(6.0));
   }
 }
 

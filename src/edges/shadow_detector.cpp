@@ -11,6 +11,7 @@ constexpr double kIsland = 0.3;          // mm of drop-out that ends the upper s
 constexpr double kSurelyTowards = 0.25;  // cosine beyond which even a short drop-out is a shadow
 constexpr double kSurelyAway = -0.6;     // cosine below which no oblique edge throws one, its normal unknown
 constexpr int kExposureReadings = 5;  // that the sensor's exposure control may lose at a change of brightness
+constexpr double kLeastSquare = 0.2;  // cosine between travel and a normal that it can be said to cross
 constexpr double kUnclear = 0.1;      // two normals whose cosines differ less cannot be told apart
 constexpr double kThresholdSpread =
     0.5;  // of the blur: how well light_threshold is known (2 % .. 15 % of the light)
@@ -105,23 +106,25 @@ Crossing crossing_of(const Run& run, const Candidate& c, const EdgeOptions& opti
   const Vec2 travel = Vec2(static_cast<double>(p.vx_mm_s), static_cast<double>(p.vy_mm_s)) / speed_mm_s(p);
   const Vec2 receiver(static_cast<double>(p.receiver_x), static_cast<double>(p.receiver_y));
   Crossing out;
-  Vec2 normal = travel;
-  double best = 0, second = 0;
-  for (const Vec2& n : options.normals) {
-    const double square = n.dot(travel);
-    if (std::abs(square) > best) {
-      // The same direction listed twice is no second opinion.
-      second = std::abs(n.dot(normal)) < 0.99 ? best : second;
-      best = std::abs(square);
-      normal = square > 0 ? n : Vec2(-n);
-    } else if (std::abs(n.dot(normal)) < 0.99) {
-      second = std::max(second, std::abs(square));
+  double best = 0;
+  for (const Vec2& n : options.normals) best = std::max(best, std::abs(n.dot(travel)));
+  out.normal_known = best > kLeastSquare;
+  out.square = 1;
+  out.towards = c.step * travel.dot(receiver);
+  if (out.normal_known) {
+    // Of two normals that the travel crosses alike, a drop-out speaks for the one that explains it.
+    bool first = true;
+    for (const Vec2& n : options.normals) {
+      const double along = n.dot(travel), square = std::abs(along);
+      if (square < best - kUnclear) continue;
+      const double towards = c.step * (along > 0 ? 1 : -1) * n.dot(receiver);
+      if (first || (c.beside_dropout ? towards > out.towards : towards < out.towards)) {
+        out.square = square;
+        out.towards = towards;
+      }
+      first = false;
     }
   }
-  out.normal_known = best > 0.2 && best - second > kUnclear;
-  if (!out.normal_known) normal = travel;
-  out.square = normal.dot(travel);
-  out.towards = c.step * normal.dot(receiver);
   out.hidden_mm =
       options.height_mm * std::tan(options.triangulation_rad) * std::max(0.0, out.towards) / out.square;
   return out;

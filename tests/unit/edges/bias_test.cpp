@@ -104,5 +104,43 @@ TEST(Shadow, LastUpperReadingCorrected) {
   }
 }
 
+TEST(Oblique, ReceiverAcrossTheTravelOfATurnedBar) {
+  std::mt19937_64 random(kSeed + 2);
+  std::uniform_real_distribution<double> uniform;
+  for (const double radius : {0.0, 4.0}) {
+    for (const double turned_deg : {-45.0, -20.0, -8.0, -4.0, -2.0, 1.0, 3.0, 5.0, 12.0, 20.0, 35.0}) {
+      StepProfile p;
+      p.radius_mm = radius;
+      p.peak = uniform(random) < 0.5;
+      p.turned_rad = turned_deg * 0.017453292519943295;
+      const double across = p.width_mm / std::cos(p.turned_rad);
+      for (const bool known : {true, false}) {
+        EdgeOptions o = options_for(p);
+        o.normals.clear();
+        if (known)
+          o.normals = {Vec2(std::cos(p.turned_rad), std::sin(p.turned_rad)),
+                       Vec2(-std::sin(p.turned_rad), std::cos(p.turned_rad))};
+        double left = 0, right = 0, pull = 0;
+        for (int i = 0; i < 4; ++i) {
+          p.phase = uniform(random);
+          p.backward = i % 2 == 1;
+          const EdgeScan scan = detect(scan_bar(p, random), o);
+          ASSERT_EQ(scan.edges.size(), 2U) << "radius " << radius << " turned " << turned_deg;
+          for (const EdgePoint& e : scan.edges) {
+            const bool first = e.x_mm < 0.5 * across;
+            const double error = (first ? -e.x_mm : e.x_mm - across) * std::cos(p.turned_rad);
+            (first ? left : right) += error / 4;
+            pull = std::max(pull, std::abs(error) / (e.sigma_mm * std::cos(p.turned_rad)));
+          }
+        }
+        std::printf("r %.0f turned %+3.0f deg, normal %s: bias %+.3f %+.3f, worst pull %.2f\n", radius,
+                    turned_deg, known ? "known" : "unknown", left, right, pull);
+        EXPECT_LE(std::abs(left), known ? 0.06 : 0.6);
+        EXPECT_LE(std::abs(right), known ? 0.06 : 0.6);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace weldcell::edges

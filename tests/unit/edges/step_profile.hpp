@@ -12,7 +12,8 @@
 namespace weldcell::edges {
 
 struct StepProfile {
-  double height_mm = 40, radius_mm = 0;  ///< bar from x = 0 to x = width, corners rounded with radius
+  double height_mm = 40,
+         radius_mm = 0;  ///< bar from 0 to width along its normal, corners rounded with radius
   double width_mm = 40, margin_mm = 20;  ///< table before and after
   double speed_mm_s = 200, rate_hz = 5000, exposure_s = 0;
   double spot_mm = 1.1, noise_mm = 0.1;
@@ -20,6 +21,7 @@ struct StepProfile {
   double correlation = 0;  ///< AR(1) of the noise from reading to reading
   bool peak = false;       ///< the sensor reads the brighter of two images; else their mean
   int receiver = 0;        ///< along the travel: +1 ahead, -1 behind, 0 across
+  double turned_rad = 0;   ///< the bar's normal against the travel: it is crossed obliquely
   double triangulation_rad = 0.3, threshold = 0.06;
   bool backward = false;  ///< travels towards -x
   double phase = 0;       ///< first reading's place, share of the spacing
@@ -35,20 +37,26 @@ inline double bar_height(const StepProfile& p, double x) {
 
 /// Whether the receiver, towards direction `toward` in x, sees the surface point at x.
 inline bool seen(const StepProfile& p, double x, double toward) {
-  const double z = bar_height(p, x), slope = std::tan(p.triangulation_rad);
+  const double z = bar_height(p, x), slope = std::tan(p.triangulation_rad) * std::abs(toward);
   const double reach = (p.height_mm - z) * slope + 0.04;
   for (double d = 0.02; d < reach; d += 0.02) {
-    if (bar_height(p, x + toward * d) > z + d / slope + 1e-9) return false;
+    if (bar_height(p, x + (toward > 0 ? d : -d)) > z + d / slope + 1e-9) return false;
   }
   return true;
 }
 
-/// One reading without noise; false = error code.
+/// Component of the receiver's direction along the bar's normal.
+inline double receiver_across(const StepProfile& p) {
+  if (p.receiver == 0) return std::abs(p.turned_rad) < 1e-9 ? 0 : std::sin(p.turned_rad);
+  return (p.backward ? -p.receiver : p.receiver) * std::cos(p.turned_rad);
+}
+
+/// One reading without noise at distance x along the bar's normal; false = error code.
 inline bool read_bar(const StepProfile& p, double x, double& z) {
   constexpr int kNodes = 121;
-  const double blur = p.spot_mm / 4, receiver = p.backward ? -p.receiver : p.receiver;
+  const double blur = p.spot_mm / 4, receiver = receiver_across(p);
   const double nearest = std::min(std::abs(x), std::abs(x - p.width_mm));
-  const double shadow = p.receiver != 0 ? p.height_mm * std::tan(p.triangulation_rad) : 0;
+  const double shadow = receiver != 0 ? p.height_mm * std::tan(p.triangulation_rad) : 0;
   if (nearest > 4.5 * blur + std::max(p.radius_mm, shadow) + 0.1) {
     z = bar_height(p, x);
     return true;
@@ -57,11 +65,11 @@ inline bool read_bar(const StepProfile& p, double x, double& z) {
   for (int j = 0; j < kNodes; ++j) {
     const double t = -4 + 8.0 * j / (kNodes - 1), weight = std::exp(-0.5 * t * t), dx = t * blur;
     total += weight;
-    if (p.receiver != 0 && !seen(p, x + dx, receiver)) continue;
+    if (receiver != 0 && !seen(p, x + dx, receiver)) continue;
     const double height = bar_height(p, x + dx);
     const int image = p.peak && height > 0.5 * p.height_mm ? 1 : 0;
     light[image] += weight;
-    sum[image] += weight * (height + (p.receiver != 0 ? receiver * dx / std::tan(p.triangulation_rad) : 0));
+    sum[image] += weight * (height + receiver * dx / std::tan(p.triangulation_rad));
   }
   const int image = light[1] > light[0] ? 1 : 0;
   if (light[image] < p.threshold * total) return false;
@@ -73,18 +81,20 @@ inline std::vector<align::SurfacePoint> scan_bar(const StepProfile& p, std::mt19
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
   std::vector<align::SurfacePoint> out;
-  const double dx = p.speed_mm_s / p.rate_hz, length = p.width_mm + 2 * p.margin_mm;
+  const double dx = p.speed_mm_s / p.rate_hz, across = p.width_mm / std::cos(p.turned_rad);
+  const double length = across + 2 * p.margin_mm;
   const auto count = static_cast<std::size_t>(length / dx);
   double noise = normal(random);
   for (std::size_t i = 0; i < count; ++i) {
     const double travelled = (static_cast<double>(i) + p.phase) * dx;
-    const double x = p.backward ? p.width_mm + p.margin_mm - travelled : travelled - p.margin_mm;
+    const double x = p.backward ? across + p.margin_mm - travelled : travelled - p.margin_mm;
     double z = 0;
     bool ok = true;
     const int parts = p.exposure_s > 0 ? 5 : 1;
     for (int e = 0; e < parts; ++e) {
       double part = 0;
-      ok = ok && read_bar(p, x + p.speed_mm_s * p.exposure_s * ((e + 0.5) / parts - 0.5), part);
+      const double moved = x + p.speed_mm_s * p.exposure_s * ((e + 0.5) / parts - 0.5);
+      ok = ok && read_bar(p, moved * std::cos(p.turned_rad), part);
       z += part / parts;
     }
     noise = p.correlation * noise + std::sqrt(1 - p.correlation * p.correlation) * normal(random);
