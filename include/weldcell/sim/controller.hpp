@@ -1,5 +1,6 @@
-// The simulated ABB controller: EGM by the documented control law, RWS 1.0 requests, and RAPID that moves the arm. Single-
-// threaded and clockless: whoever owns it gives the time. Built from the protocol facts, never from the daemon.
+// The simulated ABB controller: EGM by the documented control law, RWS 1.0 requests, and RAPID that moves the
+// arm. Single- threaded and clockless: whoever owns it gives the time. Built from the protocol facts, never
+// from the daemon.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +17,16 @@
 
 namespace weldcell::sim {
 
-/// A stretch that the torch welded: TCP positions in Base while the arc burned.
-struct WeldTrace {
-  std::string seam;
-  std::vector<Eigen::Vector3d> tcp_mm;
+/// An entry of the event log.
+struct Event {
+  int number = 0;  ///< of the entry, from 1
+  int type = 1;    ///< 1 information, 2 warning, 3 error
+  int code = 0;    ///< the controller's event number, e.g. 41822
+  HostTime at;
+  std::string title, text;
 };
+
+struct ControllerState;
 
 class Controller {
  public:
@@ -33,20 +39,33 @@ class Controller {
   std::optional<std::vector<std::byte>> egm_datagram();
   /// An EgmSensor datagram from the PC; malformed ones are counted and logged as an event, never harmful.
   void on_egm_datagram(std::span<const std::byte> datagram);
-  /// One authenticated RWS 1.0 request (digest, cookies and sessions are the server's matter).
-  ports::HttpReply handle_rws(const ports::HttpRequest& request);
+  /// One authenticated RWS 1.0 request (digest, cookies and sessions are the server's matter). Mastership
+  /// belongs to a session.
+  ports::HttpReply handle_rws(const ports::HttpRequest& request, int session = 0);
+  /// The session logged out or expired: what it held is free.
+  void end_rws_session(int session);
 
   /// True arm posture now (not what EGM reports).
   const kinematics::Joints& joints() const;
   /// True postures at earlier instants, for the laser: interpolated inside the last second.
   kinematics::Joints joints_at(HostTime t) const;
   const std::vector<WeldTrace>& weld_traces() const;
-  /// Faults from outside: "estop", "motors_off", "egm_silence", "program_stop", ...
-  void inject(const std::string& fault);
+  /// Faults from outside: "estop", "guardstop", "motors_off", "program_stop", "egm_silence", "rws_503". Those
+  /// that last end after duration_s (0: never). False when the kind is unknown.
+  bool inject(const std::string& fault, double duration_s = 0);
+
+  /// Loads a module as a disk restart would: no mastership needed. Error "rapid.*".
+  Status load_module(const std::string& text);
+  bool motors_on() const;
+  bool program_running() const;
+  bool egm_guiding() const;
+  /// Programs that ended (by end, EXIT, Stop or error) since the start.
+  std::uint64_t programs_ended() const;
+  std::uint64_t malformed_egm_datagrams() const;
+  const std::vector<Event>& events() const;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<ControllerState> state_;
 };
 
 }  // namespace weldcell::sim

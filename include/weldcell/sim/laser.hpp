@@ -1,4 +1,5 @@
-// The simulated laser: samples on its own clock, ray-cast on the members as they really lie, as MEAS-28 bytes.
+// The simulated laser: samples on its own clock, ray-cast on the members as they really lie, as MEAS-28
+// bytes.
 #pragma once
 
 #include <functional>
@@ -25,7 +26,11 @@ class LaserDevice {
 
   /// All blocks whose samples were taken up to true time `now`; pose_at is asked for instants up to `now`.
   std::vector<LaserBlock> advance(HostTime now, const PoseAt& pose_at);
-  void inject(const std::string& fault, double duration_s);
+  /// "laser_drop": the connection is gone for duration_s (0: for good); "laser_stall": blocks are held back
+  /// that long. False when the kind is unknown.
+  bool inject(const std::string& fault, double duration_s);
+  /// False while a drop lasts.
+  bool connected() const;
 
  private:
   struct State;

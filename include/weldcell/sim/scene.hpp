@@ -1,7 +1,8 @@
-// A scene: what really stands on the table, how the devices really behave, seed and faults. Read from a YAML file; its truth
-// is written to a file that the daemon never sees.
+// A scene: what really stands on the table, how the devices really behave, seed and faults. Read from a YAML
+// file; its truth is written to a file that the daemon never sees.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <string>
 #include <variant>
@@ -16,34 +17,35 @@
 namespace weldcell::sim {
 
 struct ClockTruth {
-  double offset_s = 0;       ///< device clock at host time 0
+  double offset_s = 0;  ///< device clock at host time 0
   double drift_ppm = 0;
 };
 
 struct LaserTruth {
   ClockTruth clock{12.3, 30};
-  double latency_ms = 2.7;            ///< stamp (and arrival) after mid-exposure
+  double latency_ms = 2.7;  ///< stamp (and arrival) after mid-exposure
   double exposure_ms = 0.2;
-  double transport_jitter_ms = 0.3;   ///< exponential, on the wire
+  double transport_jitter_ms = 0.3;  ///< exponential, on the wire
   double spot_mm = 1.1;
-  double noise_mm = 0.05;             ///< white, 1 sigma
-  double speckle_mm = 0.05;           ///< bound to the surface, correlated over half a spot
+  double noise_mm = 0.05;    ///< white, 1 sigma
+  double speckle_mm = 0.05;  ///< bound to the surface, correlated over half a spot
   double outlier_share = 0.002;
   double dropout_share = 0.001;
   double triangulation_rad = 0.3;
   bool shadows = true;
-  bool beam_spot = true;              ///< integrate over the spot; false: a needle
+  bool beam_spot = true;  ///< integrate over the spot; false: a needle
 };
 
 struct ControllerTruth {
   ClockTruth clock{28397.2, -15};
   double cycle_ms = 4.0;
-  double position_gain = 20;          ///< k, 1/s
+  double position_gain = 20;  ///< k, 1/s
   double low_pass_hz = 100;
   double dead_time_ms = 16;
-  double feedback_latency_ms = 0;     ///< feedBack.time minus true instant of the posture
+  double feedback_latency_ms = 0;  ///< feedBack.time minus true instant of the posture
   std::string user = "Default User", password = "robotics";
   bool auto_mode = true;
+  std::vector<std::string> modules;  ///< texts of the RAPID modules that are loaded at start
 };
 
 struct MemberTruth {
@@ -51,36 +53,71 @@ struct MemberTruth {
   bool missing = false;
 };
 
+/// How far members may lie from the drawing; drawn from the seed.
+struct MemberSpread {
+  double shift_mm = 0;   ///< 1 sigma, each direction
+  double angle_rad = 0;  ///< 1 sigma
+};
+
 struct TimedFault {
-  double at_s = 0;           ///< after the scan began ("scan+12.5"), or after start
+  double at_s = 0;  ///< after the scan began ("scan+12.5"), or after start
   bool after_scan_begin = false;
-  std::string kind;          ///< "laser_drop", "laser_stall", "egm_silence", "estop", "motors_off", "rws_503", ...
+  std::string kind;  ///< "laser_drop", "laser_stall", "egm_silence", "estop", "motors_off", "rws_503", ...
   double duration_s = 0;
 };
 
 struct Scene {
   std::string name;
   std::uint64_t seed = 1;
-  files::CellConfig cell;             ///< endpoints and true geometry of the same cell
-  workpiece::Workpiece workpiece;     ///< real shape
-  Pose2 planned;                      ///< where it was meant to lie; truth = planned moved by the placement
-  Pose2 truth;                        ///< Part in Base
-  std::vector<MemberTruth> members;   ///< one a member
+  files::CellConfig cell;            ///< endpoints and true geometry of the same cell
+  workpiece::Workpiece workpiece;    ///< real shape
+  Pose2 planned;                     ///< where it was meant to lie; truth = planned moved by the placement
+  Pose2 truth;                       ///< Part in Base
+  std::vector<MemberTruth> members;  ///< one a member
   LaserTruth laser;
   ControllerTruth controller;
   std::vector<TimedFault> faults;
-  double plc_confirm_after_s = 0.3;   ///< the simulated worker's pace
+  double plc_confirm_after_s = 0.3;  ///< the simulated worker's pace
 };
 
 /// Placement drawn from a seed: uniform within +-xy_mm and +-theta_rad about the centroid of `planned`.
 Pose2 placed(const workpiece::Workpiece& workpiece, const Pose2& planned, double xy_mm, double theta_rad,
              std::uint64_t seed);
+/// Members' deviations drawn from a seed, normal with the given spread.
+std::vector<MemberTruth> deviated(const workpiece::Workpiece& workpiece, const MemberSpread& spread,
+                                  std::uint64_t seed);
 
 /// Reads a scene file; `seed` overrides the file's when given (nonzero).
 std::variant<Scene, files::Faults> read_scene(const std::string& path, const files::CellConfig& cell,
                                               std::uint64_t seed);
 
-/// truth.json: pose, members, seams' true lines, latency, clocks.
-std::string truth_json(const Scene& scene);
+/// "laser_drop@scan+5:2" = kind, when (seconds after start or after the scan began), how long. Error
+/// "scene.fault".
+Result<TimedFault> parse_fault(const std::string& text);
+
+/// A stretch that the torch welded: TCP positions in Base while the arc burned.
+struct WeldTrace {
+  std::string seam;
+  std::vector<Eigen::Vector3d> tcp_mm;
+};
+
+/// A seam as it really lies: points of its line in Base, at the height of the drawing above the table.
+struct TrueSeam {
+  std::string name;
+  std::vector<Eigen::Vector3d> line_mm;
+};
+std::vector<TrueSeam> true_seams(const Scene& scene);
+
+/// How far the torch went from the true seam that it welded.
+struct WeldedSeam {
+  std::string seam;             ///< name of the true seam; the trace's own when the scene has no welds
+  double lateral_error_mm = 0;  ///< largest distance across the seam, in plan
+};
+std::vector<WeldedSeam> welded_seams(const Scene& scene, const std::vector<WeldTrace>& traces);
+std::vector<double> seam_errors_mm(const Scene& scene, const std::vector<WeldTrace>& traces);
+
+/// truth.json: pose, members, seams' true lines, latency, clocks; with traces also what was welded and how
+/// far off.
+std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces = {});
 
 }  // namespace weldcell::sim

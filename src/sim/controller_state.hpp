@@ -1,0 +1,85 @@
+// Everything inside the simulated controller, shared by its cycle, its RAPID instructions and its RWS
+// handler. Private.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sim/egm_channel.hpp"
+#include "sim/path_motion.hpp"
+#include "sim/rapid_task.hpp"
+#include "sim/servo.hpp"
+#include "weldcell/sim/controller.hpp"
+
+namespace weldcell::sim {
+
+enum class PanelState { MotorsOff, MotorsOn, GuardStop, EmergencyStop, EmergencyStopReset };
+const char* to_string(PanelState state);
+
+/// What moves the reference in this cycle.
+enum class Drive { Path, Egm, Ramp };
+
+struct ControllerState final : rapid::Machine {
+  ControllerState(const Scene& scene, const kinematics::ArmModel& arm_model);
+
+  // ---- cycle (controller.cpp) ----
+  void step(HostTime now_);
+  void move_reference();
+  void start_ramp(double duration_s);
+  void record_weld();
+  void set_panel(PanelState next);
+  bool start_program(bool forever);
+  void stop_program(const std::string& why);
+  void log(int type, int code, const std::string& title, const std::string& text = "");
+  bool motors_on() const { return panel == PanelState::MotorsOn; }
+  std::int64_t device_us(HostTime t) const;
+  std::vector<std::byte> egm_frame();
+
+  // ---- rapid::Machine (instructions.cpp) ----
+  bool begin(const rapid::Call& call, std::deque<Wait>& waits) override;
+  void on_program_event(int event, const std::string& what, bool error) override;
+  std::optional<rapid::Value> machine_function(const std::string& name,
+                                               const std::vector<rapid::Value>& arguments);
+
+  ControllerTruth truth;
+  kinematics::ArmModel arm;
+  double cycle_s;
+  HostTime now;
+  double run_time_s = 0;  ///< RAPID's own time: stands while the program is stopped
+
+  rapid::Memory memory;
+  rapid::Task task;
+  EgmChannel egm;
+  PathMotion path;
+  Servo servo;
+
+  PanelState panel = PanelState::MotorsOff;
+  Drive drive = Drive::Path;
+  kinematics::Joints reference{}, reference_speed{}, ramp_speed{};
+  double ramp_left_s = 0, ramp_total_s = 0;
+  double speed_ratio = 1;
+
+  EgmActivation egm_activation;
+  EgmRun egm_run;
+  bool egm_timed_out = false, egm_wait = false, egm_interrupted = false;
+  double complaint_after_s = 0;
+  std::optional<std::vector<std::byte>> datagram;
+
+  bool configuration_line = true, configuration_joint = true;
+  bool arc_on = false;
+  Eigen::Isometry3d arc_tool = Eigen::Isometry3d::Identity();
+  std::vector<WeldTrace> welds;
+
+  std::map<std::string, double> fault_until_s;  ///< lasting faults; infinity = for good
+  std::vector<Event> events;
+  int event_number = 0;
+  std::uint64_t programs_ended = 0;
+  std::map<std::string, int> mastership;     ///< domain -> session that holds it
+  std::map<std::string, std::string> files;  ///< $HOME, lower-case path -> content
+};
+
+}  // namespace weldcell::sim

@@ -1,0 +1,477 @@
+#include <optional>
+#include <set>
+
+#include "sim/rapid_lexer.hpp"
+#include "sim/rapid_syntax.hpp"
+
+namespace weldcell::sim::rapid {
+
+namespace {
+
+struct SyntaxFault {
+  int line;
+  std::string what;
+};
+
+class Parser {
+ public:
+  Parser(std::vector<Token> tokens, const TypeTable& types) : tokens_(std::move(tokens)), types_(types) {}
+
+  std::shared_ptr<Module> module() {
+    auto out = std::make_shared<Module>();
+    module_ = out.get();
+    expect_word("module");
+    std::tie(out->name, out->display) = identifier("module name");
+    if (take("(")) {
+      do {
+        out->system |= identifier("module attribute").first == "sysmodule";
+      } while (take(","));
+      expect(")");
+    }
+    while (!is_word("endmodule")) module_item();
+    next();
+    if (here().kind != Token::Kind::End) fail("text after ENDMODULE");
+    return out;
+  }
+
+ private:
+  // ---- tokens ----
+  const Token& here() const { return tokens_[at_]; }
+  void next() {
+    if (here().kind != Token::Kind::End) ++at_;
+  }
+  [[noreturn]] void fail(const std::string& what) const { throw SyntaxFault{here().line, what}; }
+  std::string shown() const {
+    return here().kind == Token::Kind::End ? "end of file" : "'" + here().text + "'";
+  }
+  bool is(const char* symbol) const { return here().kind == Token::Kind::Symbol && here().word == symbol; }
+  bool is_word(const char* word) const {
+    return here().kind == Token::Kind::Identifier && here().word == word;
+  }
+  bool take(const char* symbol) { return is(symbol) ? (next(), true) : false; }
+  bool take_word(const char* word) { return is_word(word) ? (next(), true) : false; }
+  void expect(const char* symbol) {
+    if (!take(symbol)) fail("'" + std::string(symbol) + "' expected, not " + shown());
+  }
+  void expect_word(const char* word) {
+    if (!take_word(word)) fail(std::string(word) + " expected, not " + shown());
+  }
+  std::pair<std::string, std::string> identifier(const char* what) {
+    if (here().kind != Token::Kind::Identifier) fail(std::string(what) + " expected, not " + shown());
+    std::pair<std::string, std::string> out{here().word, here().text};
+    next();
+    return out;
+  }
+  bool any_word(std::initializer_list<const char*> words) const {
+    for (const char* word : words) {
+      if (is_word(word)) return true;
+    }
+    return false;
+  }
+
+  // ---- module level ----
+  void module_item() {
+    if (here().kind == Token::Kind::End) fail("ENDMODULE expected");
+    const bool local = take_word("local");
+    if (!local) take_word("task");
+    if (any_word({"const", "pers", "var"})) {
+      module_->data.push_back(declaration());
+      module_->data.back().local = local;
+    } else if (take_word("record")) {
+      record();
+    } else if (is_word("proc")) {
+      Routine routine = this->routine();
+      routine.local = local;
+      const std::string name = routine.name;
+      if (!module_->routines.emplace(name, std::move(routine)).second)
+        fail("routine '" + name + "' declared twice");
+    } else if (any_word({"func", "trap"})) {
+      fail(here().text + " is not supported by this simulator");
+    } else {
+      fail("declaration or PROC expected, not " + shown());
+    }
+  }
+
+  void record() {
+    const std::string name = identifier("record name").first;
+    std::vector<Component> parts;
+    while (!take_word("endrecord")) {
+      const std::string type = type_name();
+      parts.push_back({identifier("component name").first, type});
+      expect(";");
+    }
+    if (parts.empty()) fail("RECORD without components");
+    module_->records[name] = std::move(parts);
+  }
+
+  std::string type_name() {
+    const auto [name, display] = identifier("type");
+    if (!types_.known(name) && !module_->records.contains(name)) fail("unknown type '" + display + "'");
+    return name;
+  }
+
+  Declaration declaration() {
+    Declaration out;
+    out.line = here().line;
+    out.storage = is_word("const")  ? Storage::Constant
+                  : is_word("pers") ? Storage::Persistent
+                                    : Storage::Variable;
+    next();
+    out.type = type_name();
+    std::tie(out.name, out.display) = identifier("data name");
+    if (take("{")) {
+      do {
+        if (here().kind != Token::Kind::Number) fail("array size expected");
+        out.dimensions.push_back(static_cast<int>(here().number));
+        if (out.dimensions.back() < 1 || out.dimensions.back() > 10000) fail("array size out of range");
+        next();
+      } while (take(","));
+      if (out.dimensions.size() > 3) fail("arrays have at most 3 dimensions");
+      expect("}");
+    }
+    if (take(":=")) out.initial = expression();
+    if (!out.initial && out.storage == Storage::Constant) fail("CONST '" + out.display + "' without a value");
+    expect(";");
+    return out;
+  }
+
+  Routine routine() {
+    Routine out;
+    out.line = here().line;
+    next();
+    std::tie(out.name, out.display) = identifier("routine name");
+    out.module = module_->name;
+    expect("(");
+    if (!take(")")) {
+      do {
+        if (is("\\") || any_word({"inout", "var", "pers"}))
+          fail("only plain parameters are supported by this simulator");
+        const std::string type = type_name();
+        out.parameters.push_back({type, identifier("parameter name").first});
+      } while (take(","));
+      expect(")");
+    }
+    while (any_word({"const", "pers", "var"})) out.data.push_back(declaration());
+    out.body = block({"endproc", "error", "undo", "backward"});
+    if (take_word("error")) {
+      out.has_error_handler = true;
+      out.error_handler = block({"endproc", "undo", "backward"});
+    }
+    if (any_word({"undo", "backward"})) fail(here().text + " is not supported by this simulator");
+    expect_word("endproc");
+    return out;
+  }
+
+  // ---- statements ----
+  Block block(std::initializer_list<const char*> ends) {
+    Block out;
+    if (++depth_ > 50) fail("nested too deep");
+    while (!any_word(ends)) {
+      if (here().kind == Token::Kind::End || is_word("endmodule") || is_word("endproc")) {
+        fail(std::string(*ends.begin()) + " expected, not " + shown());
+      }
+      if (take(";")) continue;
+      out.push_back(statement());
+    }
+    --depth_;
+    return out;
+  }
+
+  Statement make(Statement::Kind kind) {
+    Statement out;
+    out.kind = kind;
+    out.line = here().line;
+    return out;
+  }
+
+  Statement statement() {
+    if (is_word("if")) return if_statement();
+    if (is_word("test")) return test_statement();
+    if (is_word("while")) {
+      Statement out = make(Statement::Kind::While);
+      next();
+      out.target = expression();
+      expect_word("do");
+      out.branches.push_back({{}, block({"endwhile"})});
+      next();
+      return out;
+    }
+    if (is_word("for")) return for_statement();
+    return simple_statement();
+  }
+
+  Statement simple_statement() {
+    static const std::map<std::string, Statement::Kind> kWords{
+        {"return", Statement::Kind::Return},   {"exit", Statement::Kind::Exit},
+        {"stop", Statement::Kind::Stop},       {"retry", Statement::Kind::Retry},
+        {"trynext", Statement::Kind::TryNext}, {"raise", Statement::Kind::Raise}};
+    Statement out = make(Statement::Kind::Call);
+    if (take("%")) {
+      out.kind = Statement::Kind::LateCall;
+      out.target = expression();
+      expect("%");
+      out.arguments = arguments(";");
+      expect(";");
+      return out;
+    }
+    if (here().kind != Token::Kind::Identifier) fail("instruction expected, not " + shown());
+    if (const auto word = kWords.find(here().word); word != kWords.end()) {
+      out.kind = word->second;
+      next();
+      if (out.kind == Statement::Kind::Raise && !is(";")) out.target = expression();
+      while (take("\\")) identifier("switch");
+      expect(";");
+      return out;
+    }
+    if (any_word({"goto", "connect"})) fail(here().text + " is not supported by this simulator");
+    const std::size_t begin = at_;
+    out.name = identifier("instruction").first;
+    if (is(":=") || is(".") || is("{")) {
+      at_ = begin;
+      out.kind = Statement::Kind::Assign;
+      out.target = reference();
+      expect(":=");
+      out.value = expression();
+    } else if (is(":")) {
+      fail("labels are not supported by this simulator");
+    } else {
+      out.arguments = arguments(";");
+    }
+    expect(";");
+    return out;
+  }
+
+  Statement if_statement() {
+    Statement out = make(Statement::Kind::If);
+    next();
+    Branch first;
+    first.conditions.push_back(expression());
+    if (!take_word("then")) {
+      first.body.push_back(simple_statement());
+      out.branches.push_back(std::move(first));
+      return out;
+    }
+    first.body = block({"endif", "elseif", "else"});
+    out.branches.push_back(std::move(first));
+    while (take_word("elseif")) {
+      Branch branch;
+      branch.conditions.push_back(expression());
+      expect_word("then");
+      branch.body = block({"endif", "elseif", "else"});
+      out.branches.push_back(std::move(branch));
+    }
+    if (take_word("else")) out.branches.push_back({{}, block({"endif"})});
+    expect_word("endif");
+    return out;
+  }
+
+  Statement test_statement() {
+    Statement out = make(Statement::Kind::Test);
+    next();
+    out.target = expression();
+    while (take_word("case")) {
+      Branch branch;
+      do {
+        branch.conditions.push_back(expression());
+      } while (take(","));
+      expect(":");
+      branch.body = block({"endtest", "case", "default"});
+      out.branches.push_back(std::move(branch));
+    }
+    if (take_word("default")) {
+      expect(":");
+      out.branches.push_back({{}, block({"endtest"})});
+    }
+    expect_word("endtest");
+    return out;
+  }
+
+  Statement for_statement() {
+    Statement out = make(Statement::Kind::For);
+    next();
+    out.name = identifier("loop variable").first;
+    expect_word("from");
+    out.value = expression();
+    expect_word("to");
+    out.to = expression();
+    if (take_word("step")) out.step = expression();
+    expect_word("do");
+    out.branches.push_back({{}, block({"endfor"})});
+    next();
+    return out;
+  }
+
+  std::vector<Argument> arguments(const char* end) {
+    std::vector<Argument> out;
+    bool separated = true;
+    while (!is(end)) {
+      if (take("\\")) {
+        Argument argument;
+        argument.option = identifier("option").first;
+        if (take(":=")) argument.value = expression();
+        out.push_back(std::move(argument));
+        take(",");
+        separated = true;
+        continue;
+      }
+      if (!separated) fail("',' or ';' expected, not " + shown());
+      out.push_back({"", expression()});
+      separated = take(",");
+      if (separated && is(end)) fail("argument expected after ','");
+    }
+    return out;
+  }
+
+  // ---- expressions ----
+  ExpressionPtr node(Expression::Kind kind, std::string name = "") {
+    auto out = std::make_unique<Expression>();
+    out->kind = kind;
+    out->name = std::move(name);
+    return out;
+  }
+  ExpressionPtr binary(ExpressionPtr left, std::string name, ExpressionPtr right) {
+    ExpressionPtr out = node(Expression::Kind::Binary, std::move(name));
+    out->operands.push_back(std::move(left));
+    out->operands.push_back(std::move(right));
+    return out;
+  }
+
+  /// The operator here when it is one of this level, consumed.
+  std::optional<std::string> operator_of(std::initializer_list<const char*> names) {
+    for (const char* name : names) {
+      const bool word = std::isalpha(static_cast<unsigned char>(name[0])) != 0;
+      if (word ? is_word(name) : is(name)) {
+        next();
+        return name;
+      }
+    }
+    return std::nullopt;
+  }
+
+  ExpressionPtr expression() {
+    if (++depth_ > 50) fail("nested too deep");
+    ExpressionPtr left = conjunction();
+    while (const auto name = operator_of({"or", "xor"})) left = binary(std::move(left), *name, conjunction());
+    --depth_;
+    return left;
+  }
+  ExpressionPtr conjunction() {
+    ExpressionPtr left = negation();
+    while (operator_of({"and"})) left = binary(std::move(left), "and", negation());
+    return left;
+  }
+  ExpressionPtr negation() {
+    if (!take_word("not")) return relation();
+    ExpressionPtr out = node(Expression::Kind::Unary, "not");
+    out->operands.push_back(negation());
+    return out;
+  }
+  ExpressionPtr relation() {
+    ExpressionPtr left = sum();
+    if (const auto name = operator_of({"=", "<>", "<=", ">=", "<", ">"}))
+      left = binary(std::move(left), *name, sum());
+    return left;
+  }
+  ExpressionPtr sum() {
+    ExpressionPtr left = term();
+    while (const auto name = operator_of({"+", "-"})) left = binary(std::move(left), *name, term());
+    return left;
+  }
+  ExpressionPtr term() {
+    ExpressionPtr left = factor();
+    while (const auto name = operator_of({"*", "/", "div", "mod"}))
+      left = binary(std::move(left), *name, factor());
+    return left;
+  }
+  ExpressionPtr factor() {
+    if (take("-")) {
+      ExpressionPtr out = node(Expression::Kind::Unary, "-");
+      out->operands.push_back(factor());
+      return out;
+    }
+    if (take("+")) return factor();
+    return primary();
+  }
+
+  ExpressionPtr primary() {
+    if (here().kind == Token::Kind::Number) {
+      ExpressionPtr out = node(Expression::Kind::Literal);
+      out->literal = Value::of(here().number);
+      next();
+      return out;
+    }
+    if (here().kind == Token::Kind::Text) {
+      ExpressionPtr out = node(Expression::Kind::Literal);
+      out->literal = Value::of(here().text);
+      next();
+      return out;
+    }
+    if (any_word({"true", "false"})) {
+      ExpressionPtr out = node(Expression::Kind::Literal);
+      out->literal = Value::of(is_word("true"));
+      next();
+      return out;
+    }
+    if (take("(")) {
+      ExpressionPtr out = expression();
+      expect(")");
+      return out;
+    }
+    if (take("[")) {
+      ExpressionPtr out = node(Expression::Kind::Aggregate);
+      do {
+        out->operands.push_back(expression());
+      } while (take(","));
+      expect("]");
+      return out;
+    }
+    return reference();
+  }
+
+  ExpressionPtr reference() {
+    ExpressionPtr out = node(Expression::Kind::Reference, identifier("expression").first);
+    if (take("(")) {
+      out->kind = Expression::Kind::Function;
+      out->arguments = arguments(")");
+      expect(")");
+      return out;
+    }
+    for (;;) {
+      Accessor accessor;
+      if (take("{")) {
+        do {
+          accessor.indices.push_back(expression());
+        } while (take(","));
+        expect("}");
+      } else if (take(".")) {
+        accessor.component = identifier("component").first;
+      } else {
+        return out;
+      }
+      out->path.push_back(std::move(accessor));
+    }
+  }
+
+  std::vector<Token> tokens_;
+  const TypeTable& types_;
+  Module* module_ = nullptr;
+  std::size_t at_ = 0;
+  int depth_ = 0;
+};
+
+}  // namespace
+
+Result<std::shared_ptr<const Module>> parse_module(std::string_view text, const TypeTable& types) {
+  if (text.size() > 4'000'000) return Error{"rapid.syntax", "", "module larger than 4 MB", ""};
+  auto tokens = tokenize(text);
+  if (!tokens) return tokens.error();
+  try {
+    auto module = Parser(std::move(*tokens), types).module();
+    module->text = std::string(text);
+    return std::shared_ptr<const Module>(std::move(module));
+  } catch (const SyntaxFault& fault) {
+    return Error{"rapid.syntax", "line " + std::to_string(fault.line), fault.what, ""};
+  }
+}
+
+}  // namespace weldcell::sim::rapid

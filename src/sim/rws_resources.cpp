@@ -1,0 +1,251 @@
+// The resources of RWS 1.0 that only show things, and files.
+#include <fmt/format.h>
+#include <charconv>
+#include <ctime>
+
+#include "sim/controller_state.hpp"
+#include "sim/rws_handler.hpp"
+#include "weldcell/base/units.hpp"
+
+namespace weldcell::sim {
+
+using ports::HttpReply;
+
+namespace {
+
+std::string decimal(double value) { return fmt::format("{:.6g}", value); }
+std::string precise(double value) { return fmt::format("{:.9g}", value); }
+const char* const kUnused = "8.999999E+09";
+
+/// The simulated controller's calendar begins with 2026.
+std::string calendar(HostTime at) {
+  const std::time_t t = 1767225600 + static_cast<std::time_t>(seconds(at.ns));
+  std::tm parts{};
+  gmtime_r(&t, &parts);
+  return fmt::format("{:04}-{:02}-{:02} T {:02}:{:02}:{:02}", parts.tm_year + 1900, parts.tm_mon + 1,
+                     parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
+}
+
+}  // namespace
+
+HttpReply RwsHandler::mechunits() {
+  if (method_ != "GET") return fault(400, kRwsBadValue, "Invalid action");
+  const std::string unit = segment(3), what = segment(4);
+  if (unit.empty()) {
+    return answer({{"ms-mechunit-li",
+                    "ROB_1",
+                    {{"activation-allowed", "true"}, {"drive-module", "1"}, {"mode", "Activated"}}}});
+  }
+  if (rapid::lower(unit) != "rob_1") return fault(404, kRwsNoResource, "No mechanical unit " + unit);
+  if (what.empty()) {
+    return answer({{"ms-mechunit",
+                    "ROB_1",
+                    {{"name", "ROB_1"},
+                     {"type", "TCPRobot"},
+                     {"task", "T_ROB1"},
+                     {"mode", "Activated"},
+                     {"axes", "6"},
+                     {"tool-name", "tool0"},
+                     {"wobj-name", "wobj0"},
+                     {"payload-name", "load0"},
+                     {"total-payload-name", ""}}}});
+  }
+  if (what == "jointtarget") {
+    Fields fields;
+    int axis = 0;
+    for (const double joint : s_.servo.posture())
+      fields.emplace_back("rax_" + std::to_string(++axis), precise(deg(joint)));
+    for (const char c : {'a', 'b', 'c', 'd', 'e', 'f'}) fields.emplace_back(std::string("eax_") + c, kUnused);
+    return answer({{"ms-jointtarget", "jointtarget", fields}});
+  }
+  if (what == "robtarget" || what == "cartesian") return robtarget();
+  return fault(404, kRwsNoResource, "Resource not found: " + path_);
+}
+
+HttpReply RwsHandler::robtarget() {
+  const auto frame = [this](const std::string& name, const char* type) -> const rapid::Value* {
+    const rapid::Datum* datum = s_.memory.find({}, rapid::lower(name));
+    return datum && datum->type == type ? &datum->value : nullptr;
+  };
+  const auto iso = [](const rapid::Value& pose) {
+    Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
+    const auto &t = pose.items[0].items, &q = pose.items[1].items;
+    out.translation() = Eigen::Vector3d(t[0].number, t[1].number, t[2].number);
+    out.linear() = Eigen::Quaterniond(q[0].number, q[1].number, q[2].number, q[3].number)
+                       .normalized()
+                       .toRotationMatrix();
+    return out;
+  };
+  Eigen::Isometry3d pose = kinematics::forward(s_.arm, s_.servo.posture()).iso;
+  if (const std::string tool = query("tool"); !tool.empty()) {
+    const rapid::Value* value = frame(tool, "tooldata");
+    if (!value) return fault(400, kRwsBadValue, "No tool " + tool);
+    pose = pose * iso(value->items[1]);
+  }
+  if (const std::string wobj = query("wobj"); !wobj.empty() && rapid::lower(query("coordinate")) == "wobj") {
+    const rapid::Value* value = frame(wobj, "wobjdata");
+    if (!value) return fault(400, kRwsBadValue, "No work object " + wobj);
+    pose = (iso(value->items[3]) * iso(value->items[4])).inverse() * pose;
+  }
+  const Eigen::Quaterniond q(pose.linear());
+  const auto c = kinematics::configuration(s_.arm, s_.servo.posture());
+  Fields fields{{"x", precise(pose.translation().x())},
+                {"y", precise(pose.translation().y())},
+                {"z", precise(pose.translation().z())},
+                {"q1", precise(q.w())},
+                {"q2", precise(q.x())},
+                {"q3", precise(q.y())},
+                {"q4", precise(q.z())}};
+  const bool cartesian = segment(4) == "cartesian";
+  const std::string names[2][4] = {{"cf1", "cf4", "cf6", "cfx"}, {"j1", "j4", "j6", "jx"}};
+  const int conf[4] = {c.cf1, c.cf4, c.cf6, c.cfx};
+  for (std::size_t i = 0; i < 4; ++i) fields.emplace_back(names[cartesian][i], std::to_string(conf[i]));
+  for (const char e : {'a', 'b', 'c', 'd', 'e', 'f'}) {
+    // One client reads eaxa, another eax_a.
+    if (!cartesian) fields.emplace_back(std::string("eax") + e, kUnused);
+    if (!cartesian) fields.emplace_back(std::string("eax_") + e, kUnused);
+  }
+  return answer({{cartesian ? "ms-mechunit-cartesian" : "ms-robtargets", segment(4), fields}});
+}
+
+HttpReply RwsHandler::signals() {
+  static const std::vector<std::pair<const char*, const char*>> kSignals{
+      {"doArcOn", "DO"},   {"doGasOn", "DO"},          {"doWireFeed", "DO"},
+      {"doJobDone", "DO"}, {"diArcEstablished", "DI"}, {"diGateClosed", "DI"}};
+  const auto item = [this](const std::pair<const char*, const char*>& signal, const char* type) -> Item {
+    const rapid::Datum* datum = s_.memory.symbol("", rapid::lower(signal.first));
+    return {type,
+            signal.first,
+            {{"name", signal.first},
+             {"type", signal.second},
+             {"category", ""},
+             {"lvalue", decimal(datum->value.number)},
+             {"lstate", "not simulated"}}};
+  };
+  if (segment(2) != "signals") return fault(404, kRwsNoResource, "Resource not found: " + path_);
+  if (segments_.size() == 3) {
+    Items items;
+    for (const auto& signal : kSignals) items.push_back(item(signal, "ios-signal-li"));
+    return answer(items);
+  }
+  const std::string name = segments_.back();
+  for (const auto& signal : kSignals) {
+    if (rapid::lower(signal.first) != rapid::lower(name)) continue;
+    if (method_ == "GET") return answer({item(signal, "ios-signal")});
+    if (!action_is("set")) return fault(400, kRwsBadValue, "Invalid action");
+    double value = 0;
+    const std::string text = form("lvalue");
+    if (std::from_chars(text.data(), text.data() + text.size(), value).ec != std::errc{} ||
+        (value != 0 && value != 1)) {
+      return fault(400, kRwsBadValue, "Invalid lvalue");
+    }
+    s_.memory.symbol("", rapid::lower(name))->value.number = value;
+    return no_content();
+  }
+  return fault(404, kRwsBadSignal, "No signal " + name);
+}
+
+HttpReply RwsHandler::fileservice() {
+  if (rapid::lower(segment(1)) != "$home") return fault(400, kRwsNoPath, "Bad volume " + segment(1));
+  std::string path;
+  for (std::size_t i = 2; i < segments_.size(); ++i) path += (i > 2 ? "/" : "") + rapid::lower(segments_[i]);
+  if (method_ == "PUT") {
+    if (path.empty()) return fault(400, kRwsNoPath, "File name missing");
+    const bool fresh = !s_.files.contains(path);
+    s_.files[path] = body_;
+    HttpReply reply;
+    reply.status = fresh ? 201 : 200;
+    return reply;
+  }
+  if (method_ == "GET" && path.empty()) {
+    Items items;
+    for (const auto& [name, content] : s_.files) {
+      items.push_back({"fs-file",
+                       name,
+                       {{"fs-cdate", ""},
+                        {"fs-mdate", ""},
+                        {"fs-size", std::to_string(content.size())},
+                        {"fs-readonly", "false"}}});
+    }
+    return answer(items);
+  }
+  const auto file = s_.files.find(path);
+  if (file == s_.files.end()) return fault(404, kRwsNoPath, "Path does not exist: " + path_);
+  if (method_ == "DELETE") {
+    s_.files.erase(file);
+    return no_content();
+  }
+  HttpReply reply;
+  reply.status = 200;
+  reply.headers["Content-Type"] = "application/octet-stream";
+  reply.body = file->second;
+  return reply;
+}
+
+HttpReply RwsHandler::elog() {
+  if (method_ != "GET") return fault(400, kRwsBadValue, "Invalid action");
+  const auto item = [](const Event& event, const char* type) -> Item {
+    return {type,
+            "/rw/elog/0/" + std::to_string(event.number),
+            {{"msgtype", std::to_string(event.type)},
+             {"code", std::to_string(event.code)},
+             {"src-name", "T_ROB1"},
+             {"tstamp", calendar(event.at)},
+             {"title", event.title},
+             {"desc", event.text},
+             {"conseqs", ""},
+             {"causes", ""},
+             {"actions", ""},
+             {"argc", "0"}}};
+  };
+  if (segment(2).empty())
+    return answer({{"elog-domain-li",
+                    "0",
+                    {{"domain-name", "Common"}, {"numevts", std::to_string(s_.events.size())}}}});
+  const std::string wanted = segment(3);
+  Items items;
+  for (auto event = s_.events.rbegin(); event != s_.events.rend(); ++event) {
+    if (wanted.empty())
+      items.push_back(item(*event, "elog-message-li"));
+    else if (wanted == std::to_string(event->number))
+      return answer({item(*event, "elog-message")});
+  }
+  return wanted.empty() ? answer(items) : fault(404, kRwsNoResource, "No event " + wanted);
+}
+
+HttpReply RwsHandler::system() {
+  if (method_ != "GET") return fault(400, kRwsBadValue, "Invalid action");
+  Items items{{"sys-system-li",
+               "system",
+               {{"name", "SIM_2600"},
+                {"rwversion", "6.10.0130"},
+                {"rwversionname", "6.10.01.00"},
+                {"sysid", "{5E5A0000-0000-4000-8000-000000002600}"},
+                {"starttm", calendar({})}}}};
+  for (const char* option : {"616-1 PC Interface", "689-1 Externally Guided Motion (EGM)", "633-4 Arc"}) {
+    items.push_back({"sys-option-li", option, {{"option", option}}});
+  }
+  return answer(items);
+}
+
+HttpReply RwsHandler::retcode() {
+  static const std::map<std::string, const char*> kCodes{
+      {std::to_string(kRwsHeldByOther), "Requested resource is held by someone else"},
+      {std::to_string(kRwsNoMastership), "Required mastership is missing"},
+      {std::to_string(kRwsRejected), "The request was rejected"},
+      {std::to_string(kRwsBadValue), "Invalid parameter value"},
+      {std::to_string(kRwsWrongState), "Execution start refused in this state"},
+      {std::to_string(kRwsBadModule), "Module name invalid or module not loadable"},
+      {std::to_string(kRwsUnknownModule), "Unknown module or symbol"},
+      {std::to_string(kRwsNoResource), "Resource not found"},
+      {std::to_string(kRwsBadSignal), "Invalid IO signal"},
+      {std::to_string(kRwsNoPath), "Path does not exist"},
+      {std::to_string(kRwsBadModulePath), "Module path is wrong"}};
+  const auto found = kCodes.find(query("code"));
+  if (found == kCodes.end()) return fault(404, kRwsBadValue, "Unknown code");
+  return answer({{"retcode-info",
+                  query("code"),
+                  {{"code", found->first}, {"description", found->second}, {"severity", "Error"}}}});
+}
+
+}  // namespace weldcell::sim
