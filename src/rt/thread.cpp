@@ -1,80 +1,88 @@
 #include "weldcell/rt/thread.hpp"
 
+#include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <cstring>
-#include <memory>
+#include <future>
 #include <utility>
 
 namespace weldcell::rt {
 
-namespace {
-
-struct Start {
+struct Thread::State {
+  ThreadOptions options;
   std::function<void()> body;
-  int nice = 0;
+  std::promise<bool> set_up;
+  bool fifo_granted = false;
+  bool joined = false;
+  pthread_t handle{};
+
+  static void* run(void* argument) {
+    auto& state = *static_cast<State*>(argument);
+    const ThreadOptions& o = state.options;
+    pthread_setname_np(pthread_self(), o.name.substr(0, 15).c_str());
+    bool granted = true;
+    if (o.fifo_priority > 0) {
+      sched_param parameter{};
+      parameter.sched_priority = o.fifo_priority;
+      granted = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter) == 0;
+    } else if (o.nice != 0) {
+      setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), o.nice);
+    }
+    state.set_up.set_value(granted);
+    state.body();
+    return nullptr;
+  }
 };
 
-void* run(void* argument) {
-  const std::unique_ptr<Start> start(static_cast<Start*>(argument));
-  if (start->nice != 0) {
-    // On Linux the niceness belongs to the thread.
-    ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), start->nice);
-  }
-  start->body();
-  return nullptr;
-}
-
-}  // namespace
-
-Result<Thread> Thread::start(const ThreadOptions& options, std::function<void()> body) {
-  pthread_attr_t attributes;
-  pthread_attr_init(&attributes);
-  pthread_attr_setstacksize(&attributes, options.stack_bytes);
-  auto start = std::make_unique<Start>(Start{std::move(body), options.fifo_priority > 0 ? 0 : options.nice});
-  Thread thread;
-  const int made = pthread_create(&thread.handle_, &attributes, &run, start.get());
-  pthread_attr_destroy(&attributes);
-  if (made != 0) {
-    return Error{"rt.thread", options.name, std::strerror(made), "raise the limit of tasks (TasksMax=) or memory"};
-  }
-  start.release();
-  thread.running_ = true;
-  pthread_setname_np(thread.handle_, options.name.substr(0, 15).c_str());
-  if (options.fifo_priority > 0) {
-    sched_param parameters{};
-    parameters.sched_priority = options.fifo_priority;
-    thread.fifo_granted_ = pthread_setschedparam(thread.handle_, SCHED_FIFO, &parameters) == 0;
-  }
-  return thread;
-}
-
-Thread::Thread(Thread&& other) noexcept { *this = std::move(other); }
+Thread::Thread(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Thread::Thread(Thread&& other) noexcept = default;
 
 Thread& Thread::operator=(Thread&& other) noexcept {
-  if (this == &other) return *this;
   join();
-  handle_ = other.handle_;
-  fifo_granted_ = other.fifo_granted_;
-  running_ = std::exchange(other.running_, false);
+  state_ = std::move(other.state_);
   return *this;
 }
 
 Thread::~Thread() { join(); }
 
-void Thread::join() {
-  if (!std::exchange(running_, false)) return;
-  pthread_join(handle_, nullptr);
+Result<Thread> Thread::start(const ThreadOptions& options, std::function<void()> body) {
+  auto state = std::make_unique<State>();
+  state->options = options;
+  state->body = std::move(body);
+  pthread_attr_t attributes;
+  pthread_attr_init(&attributes);
+  pthread_attr_setstacksize(&attributes, std::max<std::size_t>(options.stack_bytes, PTHREAD_STACK_MIN));
+  const int fault = pthread_create(&state->handle, &attributes, &State::run, state.get());
+  pthread_attr_destroy(&attributes);
+  if (fault != 0) {
+    return Error{"thread.start", options.name,
+                 std::string("the system made no thread: ") + std::strerror(fault),
+                 "raise the limit of tasks (systemd: TasksMax)"};
+  }
+  state->fifo_granted = state->set_up.get_future().get();
+  return Thread(std::move(state));
 }
 
+void Thread::join() {
+  if (!state_ || state_->joined) return;
+  pthread_join(state_->handle, nullptr);
+  state_->joined = true;
+}
+
+const std::string& Thread::name() const { return state_->options.name; }
+bool Thread::fifo_granted() const { return state_->fifo_granted; }
+
 Status lock_memory() {
-  if (::mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return Done{};
-  return Error{"rt.mlock", "mlockall", std::strerror(errno), "set LimitMEMLOCK=infinity in the unit"};
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return Done{};
+  return Error{"memory.lock", "mlockall", std::strerror(errno), "set LimitMEMLOCK=infinity in the unit"};
 }
 
 }  // namespace weldcell::rt

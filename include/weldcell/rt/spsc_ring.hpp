@@ -1,51 +1,65 @@
-// Bounded lock-free ring between one producer and one consumer thread. Real-time safe on both sides; full drops the newest
-// and counts.
+// Bounded queue between one writing and one reading thread. Lock-free; real-time safe on both sides once
+// made.
 #pragma once
 
-#include <array>
 #include <atomic>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <type_traits>
 
 namespace weldcell::rt {
 
-template <typename T, std::size_t kCapacity>
+/// Full: the newest item is dropped and counted, so that what the reader has not seen yet stays whole. The
+/// memory is taken (and touched) by the constructor.
+template <typename T, std::size_t Capacity>
 class SpscRing {
-  static_assert(std::is_trivially_copyable_v<T>);
-  static_assert((kCapacity & (kCapacity - 1)) == 0, "a power of two");
+  static_assert(std::is_trivially_copyable_v<T>, "an item crosses as plain bytes");
+  static_assert(std::has_single_bit(Capacity), "a power of two");
+  static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
 
  public:
-  /// Producer only. False, and counted, when full.
+  SpscRing() : slots_(std::make_unique<T[]>(Capacity)) {}
+  SpscRing(const SpscRing&) = delete;
+  SpscRing& operator=(const SpscRing&) = delete;
+
+  /// Writer's side. False when the ring was full and the item is lost.
   bool push(const T& item) noexcept {
-    const std::size_t head = head_.load(std::memory_order_relaxed);
-    if (head - tail_.load(std::memory_order_acquire) == kCapacity) {
+    const std::uint64_t at = written_.load(std::memory_order_relaxed);
+    if (at - read_.load(std::memory_order_acquire) == Capacity) {
       dropped_.fetch_add(1, std::memory_order_relaxed);
       return false;
     }
-    slots_[head & (kCapacity - 1)] = item;
-    head_.store(head + 1, std::memory_order_release);
+    slots_[at % Capacity] = item;
+    written_.store(at + 1, std::memory_order_release);
     return true;
   }
 
-  /// Consumer only. False when empty.
-  bool pop(T& out) noexcept {
-    const std::size_t tail = tail_.load(std::memory_order_relaxed);
-    if (tail == head_.load(std::memory_order_acquire)) return false;
-    out = slots_[tail & (kCapacity - 1)];
-    tail_.store(tail + 1, std::memory_order_release);
+  /// Reader's side. False when there is nothing.
+  bool pop(T& item) noexcept {
+    const std::uint64_t at = read_.load(std::memory_order_relaxed);
+    if (at == written_.load(std::memory_order_acquire)) return false;
+    item = slots_[at % Capacity];
+    read_.store(at + 1, std::memory_order_release);
     return true;
   }
 
-  /// Items refused since the start. Any thread.
+  /// Items lost so far. From any thread.
   std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
-  static constexpr std::size_t capacity() noexcept { return kCapacity; }
+  /// How many items wait, as seen from any thread.
+  std::size_t size() const noexcept {
+    const std::uint64_t read = read_.load(std::memory_order_acquire);
+    return static_cast<std::size_t>(written_.load(std::memory_order_acquire) - read);
+  }
+  static constexpr std::size_t capacity() { return Capacity; }
 
  private:
-  alignas(64) std::atomic<std::size_t> head_{0};
-  alignas(64) std::atomic<std::size_t> tail_{0};
-  alignas(64) std::atomic<std::uint64_t> dropped_{0};
-  std::array<T, kCapacity> slots_{};
+  static constexpr std::size_t kCacheLine = 64;
+  std::unique_ptr<T[]> slots_;
+  alignas(kCacheLine) std::atomic<std::uint64_t> written_{0};
+  std::atomic<std::uint64_t> dropped_{0};
+  alignas(kCacheLine) std::atomic<std::uint64_t> read_{0};
 };
 
 }  // namespace weldcell::rt

@@ -1,9 +1,10 @@
-// A named thread with its own stack size and scheduling; says what the kernel granted. Made by app/ only.
+// A thread with name, scheduling and stack size, which says what the system granted; and locked memory. Not
+// real-time safe.
 #pragma once
 
-#include <pthread.h>
-
+#include <cstddef>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "weldcell/base/result.hpp"
@@ -11,34 +12,35 @@
 namespace weldcell::rt {
 
 struct ThreadOptions {
-  std::string name;                      ///< at most 15 characters
-  int fifo_priority = 0;                 ///< 0: ordinary scheduling
-  int nice = 0;                          ///< ordinary scheduling only
-  std::size_t stack_bytes = 512 * 1024;
+  std::string name;       ///< at most 15 characters are shown by the system
+  int fifo_priority = 0;  ///< 1..99: SCHED_FIFO; 0: ordinary scheduling
+  int nice = 0;           ///< of an ordinary thread
+  std::size_t stack_bytes = 256 * 1024;
 };
 
-/// Joins when it goes out of scope; the body must end by itself.
+/// Runs from start() until its body returns; joins when destroyed, so end the body first.
 class Thread {
  public:
-  Thread() = default;
-  /// Runs `body` on a new thread. Error "rt.thread" when it cannot be made. A refused FIFO is no error: fifo_granted().
+  /// Error "thread.start" when the system makes no thread. A refused FIFO priority is no error: see
+  /// fifo_granted().
   static Result<Thread> start(const ThreadOptions& options, std::function<void()> body);
+
   Thread(Thread&& other) noexcept;
   Thread& operator=(Thread&& other) noexcept;
   ~Thread();
 
   void join();
-  /// Whether the wanted priority was given; true when none was wanted.
-  bool fifo_granted() const { return fifo_granted_; }
+  const std::string& name() const;
+  /// False when a FIFO priority was asked for and refused: the thread runs with ordinary scheduling.
+  bool fifo_granted() const;
 
  private:
-  pthread_t handle_{};
-  bool running_ = false;
-  bool fifo_granted_ = true;
+  struct State;
+  explicit Thread(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
 };
 
-/// Locks present and future pages into memory, so that the real-time thread never waits for the disk.
-/// Error "rt.mlock" with the mend.
+/// Keeps all memory of the process, present and future, out of the swap. Error "memory.lock" names the cause.
 Status lock_memory();
 
 }  // namespace weldcell::rt
