@@ -17,14 +17,15 @@ constexpr double kRest_rad_s = 1e-6;
 constexpr double kStepMismatch_rad = 1e-5;
 
 struct Worst {
+  static constexpr double kNotANumber = 1e300;  ///< worse than any number
   double ratio = 1 + kSlack;
   Error error;
 
   void offer(double value, double limit, const char* code, const char* quantity, const char* unit,
              std::size_t axis, double time_s, const char* mend) {
     const double share = std::abs(value) / limit;
-    if (!(share > ratio || std::isnan(share))) return;
-    ratio = std::isnan(share) ? 1e300 : share;
+    if (ratio >= kNotANumber || !(share > ratio || std::isnan(share))) return;
+    ratio = std::isnan(share) ? kNotANumber : share;
     error = {code, fmt::format("J{} at {:.3f} s", axis + 1, time_s),
              fmt::format("{} {:.2f} {} above the limit {:.2f}", quantity, deg(value), unit, deg(limit)),
              mend};

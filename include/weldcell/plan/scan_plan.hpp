@@ -12,11 +12,8 @@
 
 namespace weldcell::plan {
 
-enum class Pattern : std::uint8_t {
-  Zigzag,
-  Spiral,
-  Adaptive
-};  ///< Adaptive: sparse spiral, then zigzag where found
+/// Adaptive: a sparse spiral first, then a zigzag where the part was found; beam_paths() gives its spiral.
+enum class Pattern : std::uint8_t { Zigzag, Spiral, Adaptive };
 
 struct Inspection {
   Pattern pattern = Pattern::Zigzag;
@@ -32,8 +29,8 @@ struct Inspection {
 struct BeamPath {
   std::string name;
   std::vector<Vec2> points;  ///< two for a line, many for a spiral
-  double receiver_angle_rad =
-      0;  ///< direction in Base towards which the laser's receiver looks during this path
+  /// Direction in Base towards which the laser's receiver looks; plan_scan() may turn it by half a turn.
+  double receiver_angle_rad = 0;
 };
 
 /// Zigzag across each member's axis (alternating direction), or one elliptic spiral over the outline; frame
