@@ -17,11 +17,15 @@ void detect_by_paper(const Run& run, const EdgeOptions& options, EdgeScan& out) 
   const double threshold = 0.5 * options.height_mm;
   std::size_t k = 0;
   while (k + 1 < valid.size()) {
-    // First stage: neighbours; second stage: two apart, for a step that one reading fell into.
+    // First stage: neighbours; second stage: two apart, for a step that readings fell into, where it is
+    // highest.
     std::size_t width = 0;
+    const auto over_two = [&](std::size_t i) {
+      return i + 2 < valid.size() ? std::abs(z(i + 2) - z(i)) : 0.0;
+    };
     if (std::abs(z(k + 1) - z(k)) > threshold) {
       width = 1;
-    } else if (k + 2 < valid.size() && std::abs(z(k + 2) - z(k)) > threshold) {
+    } else if (over_two(k) > threshold && over_two(k) >= over_two(k + 1)) {
       width = 2;
     }
     if (width == 0) {
@@ -33,8 +37,6 @@ void detect_by_paper(const Run& run, const EdgeOptions& options, EdgeScan& out) 
     const double slot = run.s_mm[b] - run.s_mm[a], height = z(k + width) - z(k);
     if (slot > kWidestSlot) {
       ++out.summary.paper_slot_too_wide;
-    } else if (!height_fits(std::abs(height), options)) {
-      ++out.summary.bad_height;
     } else {
       const align::SurfacePoint &p = run.points[a], &q = run.points[b];
       EdgePoint edge;
