@@ -1,5 +1,6 @@
 #include "fit.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -165,7 +166,7 @@ class Refinement {
 
   Fit run() {
     find_members();
-    choose_priors();
+    choose_inset();
     for (int step = 0; step < 4; ++step) iterate(step);
     finish();
     return std::move(fit_);
@@ -220,11 +221,14 @@ class Refinement {
       weigh_geman_mcclure(equations, scale);
       take(equations.solve(1, free_, true));
     }
+    const double shift = std::max(priors_.member_shift_mm, 0.2),
+                 angle = std::max(priors_.member_angle_rad, 0.001);
+    const Eigen::Vector3d tolerance(shift * shift, shift * shift, angle * angle);
     for (std::size_t m = 0; m < free_.size(); ++m) {
       const MemberShift& u = fit_.state.members[m];
-      const double off = std::hypot(u.x(), u.y()) / std::max(priors_.member_shift_mm, 0.2);
-      const double turned = std::abs(u.z()) / std::max(priors_.member_angle_rad, 0.001);
-      free_[m] = off > kFarOff || turned > 2 * kFarOff;
+      Eigen::Matrix3d spread = fit_.member_covariance[m];
+      spread.diagonal() += tolerance;
+      free_[m] = u.dot(spread.ldlt().solve(u)) > kFarOff * kFarOff;
     }
     measure_scale();
   }
@@ -244,22 +248,16 @@ class Refinement {
     fit_.scale = std::clamp(*middle / 0.6745, 1.0, 1e3);
   }
 
-  /// A latency or an inset far outside its prior is real: then the prior gives way instead of bending the
-  /// pose. The evidence of the points decides, and it charges a wide prior for what it allows.
-  void choose_priors() {
+  /// Sharp edges in the drawing: an inset is only believed when the points insist on it. Round ones: its
+  /// prior gives way when the points insist.
+  void choose_inset() {
     place();
-    if (priors_.latency_ms > 0) {
-      Priors wide = priors_;
-      wide.latency_ms = kWideLatency_ms;
-      if (evidence_of(wide) > evidence_of(priors_) + kPriorHolds_nats) priors_ = wide;
-    }
     if (priors_.inset_mm <= 0) return;
     const bool any_round = std::any_of(fields_.edges().begin(), fields_.edges().end(),
                                        [](const FieldEdge& e) { return e.round; });
     Priors without = priors_, wide = priors_;
     wide.inset_mm = kWideInset_mm;
     wide.inset_everywhere = !any_round;
-    // Sharp edges in the drawing: an inset is only believed when the points insist on it.
     if (!any_round) without.inset_mm = 0;
     priors_ = evidence_of(wide) > evidence_of(without) + kPriorHolds_nats ? wide : without;
   }
@@ -283,8 +281,20 @@ class Refinement {
     place();
     NormalEquations equations(fields_.member_centroids(), priors_);
     weigh_mixture(equations);
-    take(equations.solve_over_scales(free_));
+    take(solve_over_latency(equations));
     if (step == 1 || step == 2) rescale();
+  }
+
+  /// A latency outside its prior must not bend the pose: its stated prior and a wide one stand side by side,
+  /// and the evidence, which charges the wide one for what it allows, weighs them.
+  Solution solve_over_latency(NormalEquations& equations) const {
+    Solution stated = equations.solve_over_scales(free_);
+    if (priors_.latency_ms <= 0) return stated;
+    Priors wide = priors_;
+    wide.latency_ms = kWideLatency_ms;
+    equations.set_priors(wide);
+    Solution free = equations.solve_over_scales(free_);
+    return mean_of({stated, free}, {stated.log_evidence, free.log_evidence});
   }
 
   /// Residuals larger than stated widen everything; smaller ones are not believed.
@@ -336,7 +346,8 @@ class Refinement {
     }
   }
 
-  /// In units of the drawing's tolerance.
+  /// Sigmas of tolerance and measurement together at which a member no longer counts as set up by the
+  /// drawing.
   static constexpr double kFarOff = 4.5;
 
   const TemplateFields& fields_;

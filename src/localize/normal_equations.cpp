@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -46,7 +47,6 @@ NormalEquations::NormalEquations(const std::vector<Vec2>& member_centroids, cons
 
 void NormalEquations::clear() {
   for (Sums& sums : sums_) sums.setZero();
-  weight_sum_ = 0;
 }
 
 void NormalEquations::add(int member, const Row& row, double weight) {
@@ -56,7 +56,6 @@ void NormalEquations::add(int member, const Row& row, double weight) {
     const double wf = weight * f[j];
     for (int i = 0; i <= j; ++i) s[j * 6 + i] += wf * f[i];
   }
-  weight_sum_ += weight;
 }
 
 Common NormalEquations::solve_rigid() const {
@@ -134,30 +133,33 @@ Solution NormalEquations::solve(double k, const std::vector<bool>& free_members,
 Solution NormalEquations::solve_over_scales(const std::vector<bool>& free_members) const {
   const bool rigid = !(priors_.member_shift_mm > 0 || priors_.member_angle_rad > 0);
   if (rigid) return solve(0, free_members, true);
-  std::array<Solution, kScales.size()> each;
-  std::array<double, kScales.size()> weight{};
-  double best = -1e300, sum = 0;
-  for (std::size_t i = 0; i < kScales.size(); ++i) {
-    each[i] = solve(kScales[i].k, free_members, true);
-    best = std::max(best, each[i].log_evidence + kScales[i].log_prior);
+  std::vector<Solution> each;
+  std::vector<double> log_weight;
+  for (const Scale& scale : kScales) {
+    each.push_back(solve(scale.k, free_members, true));
+    log_weight.push_back(each.back().log_evidence + scale.log_prior);
   }
-  for (std::size_t i = 0; i < kScales.size(); ++i) {
-    weight[i] = std::exp(each[i].log_evidence + kScales[i].log_prior - best);
-    sum += weight[i];
-  }
+  return mean_of(each, log_weight);
+}
+
+Solution mean_of(const std::vector<Solution>& each, const std::vector<double>& log_weight) {
+  const double best = *std::max_element(log_weight.begin(), log_weight.end());
+  double sum = 0;
+  for (const double w : log_weight) sum += std::exp(w - best);
   Solution out;
-  out.members.resize(sums_.size());
+  const std::size_t members = each.front().members.size();
+  out.members.resize(members);
   out.log_evidence = best + std::log(sum);
   for (std::size_t i = 0; i < each.size(); ++i) {
-    const double share = weight[i] / sum;
+    const double share = std::exp(log_weight[i] - best) / sum;
     out.common += share * each[i].common;
-    for (std::size_t m = 0; m < sums_.size(); ++m) out.members[m].shift += share * each[i].members[m].shift;
+    for (std::size_t m = 0; m < members; ++m) out.members[m].shift += share * each[i].members[m].shift;
   }
   for (std::size_t i = 0; i < each.size(); ++i) {
-    const double share = weight[i] / sum;
+    const double share = std::exp(log_weight[i] - best) / sum;
     const Common off = each[i].common - out.common;
     out.covariance += share * (each[i].covariance + off * off.transpose());
-    for (std::size_t m = 0; m < sums_.size(); ++m) {
+    for (std::size_t m = 0; m < members; ++m) {
       const MemberShift member_off = each[i].members[m].shift - out.members[m].shift;
       out.members[m].covariance +=
           share * (each[i].members[m].covariance + member_off * member_off.transpose());

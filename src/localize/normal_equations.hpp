@@ -30,6 +30,9 @@ struct Solution {
   double log_evidence = 0;  ///< restricted likelihood of the member scale, up to a constant
 };
 
+/// The mean over several answers, each with its log weight; covariances grow by the spread between them.
+Solution mean_of(const std::vector<Solution>& each, const std::vector<double>& log_weight);
+
 class NormalEquations {
  public:
   /// member_centroids about the template's centroid.
@@ -37,7 +40,8 @@ class NormalEquations {
 
   void clear();
   void add(int member, const Row& row, double weight);
-  double weight_sum() const { return weight_sum_; }
+  /// Other priors over the same sums.
+  void set_priors(const Priors& priors) { priors_ = priors; }
 
   /// Common parameters alone, members rigid.
   Common solve_rigid() const;
@@ -61,7 +65,6 @@ class NormalEquations {
   std::vector<Vec2> centroids_;
   Priors priors_;
   std::vector<Sums> sums_;
-  double weight_sum_ = 0;
 };
 
 /// Prior of a member about which nothing is assumed.
