@@ -109,8 +109,11 @@ class Columns {
 
 std::string joints_text(const kinematics::Joints& q) {
   std::string out;
-  // A negative zero would print as -0.
-  for (const double angle : q) out += fmt::format("{}{:.9f}", out.empty() ? "" : ",", deg(angle) + 0.0);
+  for (const double angle : q) {
+    // What would print as -0.000000000 is 0.
+    const double shown = std::abs(deg(angle)) < 5e-10 ? 0 : deg(angle);
+    out += fmt::format("{}{:.9f}", out.empty() ? "" : ",", shown);
+  }
   return out;
 }
 

@@ -21,19 +21,18 @@ Eigen::Vector3d torch_axis(const workpiece::Weld& weld, const Eigen::Vector3d& t
   Vec2 d = travel.head<2>();
   d = d.norm() > 1e-9 ? Vec2(d.normalized()) : Vec2::UnitX();
   const Vec2 left(-d.y(), d.x());
-  const Eigen::Vector3d body(
-      std::tan(weld.work_angle_rad) * left.x() - std::tan(weld.travel_angle_rad) * d.x(),
-      std::tan(weld.work_angle_rad) * left.y() - std::tan(weld.travel_angle_rad) * d.y(), 1);
-  return -body.normalized();
+  const double work = weld.work_angle_rad, push = weld.travel_angle_rad;
+  const Eigen::Vector3d across(std::sin(work) * left.x(), std::sin(work) * left.y(), std::cos(work));
+  return std::sin(push) * Eigen::Vector3d(d.x(), d.y(), 0) - std::cos(push) * across;
 }
 
 std::vector<Task> weld_tasks(const workpiece::Workpiece& workpiece) {
   std::vector<Task> out;
   for (const workpiece::Weld& weld : workpiece.welds) {
     const std::vector<Eigen::Vector3d> points = workpiece::sample_path(weld, 1e6);
+    if (points.size() < 2) continue;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const std::size_t j = i + 1 < points.size() ? i : i - 1;
-      if (points.size() < 2) continue;
       out.push_back({points[i], torch_axis(weld, points[j + 1] - points[j])});
     }
   }
