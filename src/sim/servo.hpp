@@ -15,23 +15,24 @@ class Servo {
 
   /// The reference of this cycle; afterwards posture() is the arm's at `now`.
   void step(HostTime now, const kinematics::Joints& reference);
-  const kinematics::Joints& posture() const { return record_[at_].joints; }
-  /// Interpolated (cubic) between cycles; clamped to what is remembered (2 s).
+  const kinematics::Joints& posture() const { return record_[at_]; }
+  /// Cubic between cycles. Known for the last two seconds, and ahead as far as the dead time: what the arm
+  /// will do there is decided already. Clamped beyond. step() must have been called at equal intervals of the
+  /// cycle.
   kinematics::Joints posture_at(HostTime t) const;
 
  private:
   static constexpr std::size_t kRemembered = 512;
-  struct Record {
-    HostTime t;
-    kinematics::Joints joints{}, speed{};
-  };
-  const Record& back(std::size_t cycles) const { return record_[(at_ + kRemembered - cycles) % kRemembered]; }
+  /// Posture k cycles from now; k may be negative.
+  kinematics::Joints at_cycle(int k) const;
 
   double cycle_s_, delay_cycles_;
   std::array<kinematics::Joints, 64> line_{};
   std::size_t line_at_ = 0;
-  std::array<Record, kRemembered> record_{};
-  std::size_t at_ = 0, count_ = 1;
+  std::array<kinematics::Joints, kRemembered> record_{};
+  std::size_t at_ = 0;
+  int count_ = 1;
+  HostTime now_;
 };
 
 }  // namespace weldcell::sim

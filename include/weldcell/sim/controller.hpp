@@ -47,7 +47,8 @@ class Controller {
 
   /// True arm posture now (not what EGM reports).
   const kinematics::Joints& joints() const;
-  /// True postures at earlier instants, for the laser: interpolated inside the last second.
+  /// True postures for the laser: the last two seconds, and ahead as far as the servo's dead time has decided
+  /// them. step() must have been called at equal intervals of the cycle.
   kinematics::Joints joints_at(HostTime t) const;
   const std::vector<WeldTrace>& weld_traces() const;
   /// Faults from outside: "estop", "guardstop", "motors_off", "program_stop", "egm_silence", "rws_503". Those

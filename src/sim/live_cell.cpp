@@ -1,0 +1,119 @@
+#include "sim/live_cell.hpp"
+
+#include <time.h>
+
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace weldcell::sim {
+
+namespace {
+
+HostTime monotonic() {
+  timespec t{};
+  ::clock_gettime(CLOCK_MONOTONIC, &t);
+  return {t.tv_sec * kSecond + t.tv_nsec};
+}
+
+void sleep_until(HostTime t) {
+  timespec at{t.ns / kSecond, t.ns % kSecond};
+  ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr);
+}
+
+}  // namespace
+
+LiveCell::LiveCell(Scene scene, LiveOptions options)
+    : scene_(std::move(scene)),
+      options_(std::move(options)),
+      controller_(scene_, scene_.cell.setup.arm),
+      laser_(scene_),
+      egm_(scene_.cell.egm),
+      laser_server_(scene_.cell.laser),
+      rws_(scene_.cell.rws, scene_.controller.user, scene_.controller.password, scene_.seed, controller_,
+           lock_),
+      faults_(scene_.faults.begin(), scene_.faults.end()) {
+  if (options_.plc) {
+    plc_ = std::make_unique<PlcLink>(scene_.cell.modbus, scene_.cell.word_order,
+                                     PlcWorker(scene_.plc_confirm_after_s, options_.plc_rearm));
+  }
+}
+
+std::string LiveCell::ports_json() const {
+  const nlohmann::ordered_json out{{"egm", scene_.cell.egm.port},
+                                   {"rws", rws_.port()},
+                                   {"laser", laser_server_.port()},
+                                   {"modbus", scene_.cell.modbus.port}};
+  return out.dump();
+}
+
+void LiveCell::write_truth() {
+  std::string text;
+  {
+    const std::lock_guard<std::mutex> hold(lock_);
+    text = truth_json(scene_, controller_.weld_traces());
+  }
+  const std::string fresh = options_.truth_file + ".new";
+  std::ofstream file(fresh, std::ios::binary);
+  file << text << '\n';
+  file.close();
+  if (!file || std::rename(fresh.c_str(), options_.truth_file.c_str()) != 0) {
+    std::fprintf(stderr, "weldcell-sim: cannot write %s\n", options_.truth_file.c_str());
+  }
+}
+
+void LiveCell::start_faults(HostTime now) {
+  if (scan_begin_s_ < 0 && controller_.egm_guiding()) scan_begin_s_ = seconds(now.ns);
+  std::erase_if(faults_, [&](const TimedFault& fault) {
+    if (fault.after_scan_begin && scan_begin_s_ < 0) return false;
+    if (seconds(now.ns) < fault.at_s + (fault.after_scan_begin ? scan_begin_s_ : 0)) return false;
+    std::fprintf(stderr, "weldcell-sim: fault %s for %g s\n", fault.kind.c_str(), fault.duration_s);
+    if (!laser_.inject(fault.kind, fault.duration_s)) controller_.inject(fault.kind, fault.duration_s);
+    return true;
+  });
+}
+
+void LiveCell::cycle(HostTime now) {
+  const std::lock_guard<std::mutex> hold(lock_);
+  while (const auto datagram = egm_.receive()) controller_.on_egm_datagram(*datagram);
+  start_faults(now);
+  controller_.step(now);
+  if (const auto datagram = controller_.egm_datagram()) egm_.send(*datagram);
+  programs_ended_ = controller_.programs_ended();
+  // The arm's next postures are decided already (dead time), so a block is known before it is due on the
+  // wire.
+  const double ahead_ms = std::min(scene_.controller.cycle_ms, scene_.controller.dead_time_ms / 2);
+  const auto pose_at = [this](HostTime t) {
+    return kinematics::forward(scene_.cell.setup.arm, controller_.joints_at(t));
+  };
+  for (LaserBlock& block : laser_.advance(now + from_seconds(ahead_ms * 1e-3), pose_at)) {
+    blocks_.push_back(std::move(block));
+  }
+}
+
+void LiveCell::run(const std::atomic<bool>& stop) {
+  write_truth();
+  const HostTime start = monotonic();
+  const Nanoseconds cycle_ns = from_seconds(scene_.controller.cycle_ms * 1e-3);
+  HostTime next{cycle_ns};
+  while (!stop) {
+    const bool block_first = !blocks_.empty() && blocks_.front().arrival < next;
+    sleep_until(start + (block_first ? blocks_.front().arrival : next).ns);
+    const HostTime now{monotonic() - start};
+    if (now >= next) {
+      cycle(next);
+      next = next + cycle_ns;
+      laser_server_.accept_clients();
+      if (!laser_.connected()) laser_server_.drop_clients();
+    }
+    laser_server_.send_due(blocks_, now);
+    if (programs_ended_ != programs_seen_) {
+      programs_seen_ = programs_ended_;
+      write_truth();
+    }
+  }
+  plc_.reset();
+  write_truth();
+}
+
+}  // namespace weldcell::sim

@@ -1,0 +1,61 @@
+// Who may talk to the simulated controller: HTTP digest (MD5, qop=auth), nonces that expire, and the
+// controller's 70 sessions with their cookies. Time is an argument. Pure.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace weldcell::sim {
+
+inline constexpr std::size_t kRwsMaxSessions = 70;
+inline constexpr double kRwsSessionExpiry_s = 300;
+
+struct RwsAccess {
+  enum class Verdict { Allowed, Challenge, Full };
+  Verdict verdict = Verdict::Challenge;
+  int session = 0;                       ///< when allowed
+  std::string challenge;                 ///< WWW-Authenticate, when challenged
+  std::vector<std::string> set_cookies;  ///< Set-Cookie values
+};
+
+class RwsSessions {
+ public:
+  RwsSessions(std::string user, std::string password, std::uint64_t seed)
+      : user_(std::move(user)), password_(std::move(password)), seed_(seed) {}
+
+  /// Judges one request by its Authorization and Cookie headers ("" when absent).
+  RwsAccess admit(const std::string& method, const std::string& uri, const std::string& authorization,
+                  const std::string& cookie, double now_s);
+  void log_out(int session);
+  /// Sessions that ended by inactivity since the last call.
+  std::vector<int> take_expired();
+  std::size_t count() const { return sessions_.size(); }
+
+ private:
+  struct Session {
+    std::string cookie;
+    double last_s = 0;
+  };
+  bool digest_right(const std::string& method, const std::string& uri, const std::string& authorization,
+                    double now_s, bool& stale) const;
+  std::string nonce(double now_s) const;
+  bool nonce_fresh(const std::string& nonce, double now_s) const;
+  std::string token(const char* purpose);
+  void expire(double now_s);
+
+  std::string user_, password_;
+  std::uint64_t seed_, tokens_ = 0;
+  int next_session_ = 1;
+  std::map<int, Session> sessions_;
+  std::vector<int> expired_;
+};
+
+/// Hexadecimal MD5 of a text.
+std::string md5_hex(const std::string& text);
+/// The items of a Digest header: Digest a="b", c=d.
+std::map<std::string, std::string> parse_digest(const std::string& header);
+
+}  // namespace weldcell::sim
