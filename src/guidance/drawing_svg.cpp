@@ -12,7 +12,7 @@ const char* css(Colour colour) {
     case Colour::Place:
       return "#3dff6e";
     case Colour::Placed:
-      return "#5a7a62";
+      return "#6f9a7b";
     case Colour::Fixture:
       return "#ffd23d";
     case Colour::Text:
@@ -67,9 +67,9 @@ std::string drawing_svg(const Drawing& drawing) {
   }
   for (const PixelText& t : drawing.texts) {
     out += fmt::format(
-        "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"{:.1f}\" fill=\"{}\" text-anchor=\"middle\" "
-        "dominant-baseline=\"central\" "
-        "font-family=\"sans-serif\" font-weight=\"bold\">{}</text>",
+        // As a style: a page's rule for text must not make it dark on the black ground.
+        "<text x=\"{:.1f}\" y=\"{:.1f}\" style=\"font:bold {:.1f}px sans-serif;fill:{};text-anchor:middle;"
+        "dominant-baseline:central\">{}</text>",
         t.px.x(), t.px.y(), t.height_px, css(t.colour), escaped(t.text));
   }
   return out + "</svg>";

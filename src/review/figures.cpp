@@ -273,8 +273,10 @@ std::string residual_histogram(const ReportInput& in) {
   for (const double v : values) sum += v, squares += v * v, largest = std::max(largest, std::abs(v));
   const double n = static_cast<double>(values.size()), mean = sum / n;
   const double sigma = std::sqrt(std::max(1e-12, squares / n - mean * mean));
-  const double width = round_step(std::max(0.01, 2 * largest / 28));
-  const int half = std::max(3, static_cast<int>(std::ceil(largest / width)));
+  // A few far points must not squeeze all others into two bars: they are counted in the outermost ones.
+  const double range = std::min(largest, std::abs(mean) + 3 * sigma);
+  const double width = round_step(std::max(0.005, 2 * range / 36));
+  const int half = std::max(3, static_cast<int>(std::ceil(range / width)));
   std::vector<int> counts(static_cast<std::size_t>(2 * half), 0);
   for (const double v : values) {
     const int bin = std::clamp(static_cast<int>(std::floor(v / width)) + half, 0, 2 * half - 1);

@@ -57,7 +57,8 @@ std::string numbers(const ReportInput& in) {
     }();
     out += tile("found x, y", number(f.pose.x_mm, 2) + ", " + number(f.pose.y_mm, 2), "mm");
     out += tile("found turn", number(deg(f.pose.theta_rad), 3), "deg");
-    out += tile("off the plan", signed_number(offset.dx_mm, 2) + ", " + signed_number(offset.dy_mm, 2),
+    out += tile("off the plan, at the middle",
+                signed_number(offset.dx_mm, 2) + ", " + signed_number(offset.dy_mm, 2),
                 "mm, " + signed_number(deg(offset.dtheta_rad), 2) + " deg");
     out += tile("known to (1 sigma)",
                 number(std::sqrt(std::max(0.0, f.covariance(0, 0))), 2) + ", " +

@@ -22,7 +22,7 @@ p{margin:4px 0 10px}
 .verdict.reject{border-left-color:var(--no)}.verdict.reject b{color:var(--no)}
 .todo{background:#fff8e5;border:1px solid #d9b44a;border-radius:10px;padding:12px 18px;margin:0 0 14px}
 .todo h2{font-size:17px}.todo ol{margin:4px 0;padding-left:22px}
-.numbers{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:10px;margin:0 0 14px;padding:0}
+.numbers{display:grid;grid-template-columns:repeat(auto-fit,minmax(230px,1fr));gap:10px;margin:0 0 14px;padding:0}
 .numbers div{background:var(--paper);border:1px solid var(--rule);border-radius:10px;padding:10px 14px}
 .numbers dt{font-size:13px;color:var(--soft)}
 .numbers dd{margin:0;font-size:20px;font-weight:600;font-variant-numeric:tabular-nums}
