@@ -20,7 +20,8 @@ double closest_turn(double angle, double near) { return angle + kTurn * std::rou
 bool elbow_angle(double lower_mm, double upper_mm, double distance_mm, double& elbow_rad) {
   const double from_stretched = lower_mm + upper_mm - distance_mm;
   const double from_folded = distance_mm - std::abs(lower_mm - upper_mm);
-  if (from_stretched < -kReachSlack_mm || from_folded < -kReachSlack_mm) return false;
+  // Written so that a pose that is no number is out of reach.
+  if (!(from_stretched >= -kReachSlack_mm && from_folded >= -kReachSlack_mm)) return false;
   const double far = std::max(0.0, from_stretched) * (lower_mm + upper_mm + distance_mm);
   const double close = std::max(0.0, from_folded) * (distance_mm + std::abs(lower_mm - upper_mm));
   elbow_rad = 2 * std::atan2(std::sqrt(far), std::sqrt(close));
@@ -54,7 +55,7 @@ void inverse_branches(const ArmModel& arm, const Transform<Base, Flange>& pose, 
   const Eigen::Vector3d wrist = pose.iso.translation() - arm.c4 * rotation.col(2);
   const double flat2 = wrist.head<2>().squaredNorm() - arm.b * arm.b;
   out.valid.fill(false);
-  if (flat2 < 0) return;
+  if (!(flat2 >= 0)) return;
   const double flat = std::sqrt(flat2);
   const double bearing = std::atan2(wrist.y(), wrist.x());
   const double aside = std::atan2(arm.b, flat);
@@ -97,7 +98,7 @@ bool nearest_turns(const ArmModel& arm, const Joints& near, double margin_rad, J
     double q = closest_turn(joints[i], near[i]);
     if (q < low) q += kTurn * std::ceil((low - q) / kTurn);
     if (q > high) q -= kTurn * std::ceil((q - high) / kTurn);
-    if (q < low) return false;
+    if (!(q >= low && q <= high)) return false;
     joints[i] = q;
   }
   return true;
@@ -143,7 +144,7 @@ bool inverse_near(const ArmModel& arm, const Transform<Base, Flange>& pose, cons
   Joints q = branches.joints[slot];
   if (!nearest_turns(arm, near, margin_rad, q)) return false;
   for (std::size_t i = 0; i < 6; ++i) {
-    if (std::abs(q[i] - near[i]) > max_step_rad) return false;
+    if (!(std::abs(q[i] - near[i]) <= max_step_rad)) return false;
   }
   out = q;
   return true;

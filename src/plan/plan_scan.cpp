@@ -17,6 +17,9 @@ namespace {
 constexpr double kReserve = 0.96;
 /// Half window over which the speed on a curve may change, in seconds of travel.
 constexpr double kEase_s = 0.25;
+/// A scan that takes longer is a slip in the job's pitch or speed, and its samples would not fit the daemon's
+/// memory.
+constexpr double kLongestScan_s = 1200;
 
 Error unreachable(const std::string& path, const Eigen::Vector3d& place) {
   return {"plan.unreachable", path,
@@ -271,6 +274,17 @@ Result<MotionPlan> plan_scan(const cell::CellSetup& cell, const std::vector<Beam
   }
   if (!(speed_mm_s > 0))
     return Error{"plan.speed", "", "the scanning speed is not positive", "state speed_mm_s"};
+  double length_mm = 0;
+  for (const BeamPath& path : paths) {
+    for (std::size_t i = 1; i < path.points.size(); ++i)
+      length_mm += (path.points[i] - path.points[i - 1]).norm();
+  }
+  if (!(length_mm / speed_mm_s <= kLongestScan_s)) {
+    return Error{"plan.too_long", "",
+                 fmt::format("{:.0f} mm of path at {} mm/s take more than {:.0f} s", length_mm, speed_mm_s,
+                             kLongestScan_s),
+                 "widen pitch_mm or raise speed_mm_s"};
+  }
   return ScanPlanner(cell, *limits, top_z_mm, speed_mm_s).plan(paths, near);
 }
 

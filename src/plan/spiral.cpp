@@ -87,7 +87,8 @@ Ellipse ellipse_over(const workpiece::Workpiece& workpiece, const Inspection& in
 std::vector<BeamPath> spiral_paths(const workpiece::Workpiece& workpiece, const Inspection& inspection) {
   if (workpiece.members.empty()) return {};
   const Ellipse e = ellipse_over(workpiece, inspection);
-  const double pitch = std::clamp(inspection.pitch_mm, 1.0, e.half_major);
+  // Finer than this no scan would end: plan_scan() refuses it by its length.
+  const double pitch = std::clamp(inspection.pitch_mm, e.half_major / 200, e.half_major);
   const double end = 2 * kPi * e.half_major / pitch;
   const double step = std::clamp(pitch / 20, 0.5, 5.0);
   // r = pitch * turns: the ellipse's axes grow in proportion, so the gap between turns is the pitch along the

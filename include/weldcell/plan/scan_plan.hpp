@@ -40,7 +40,9 @@ std::vector<BeamPath> beam_paths(const workpiece::Workpiece& workpiece, const Po
 
 /// Joint motion that follows the beam paths in order, at inspection speed inside them and jerk-limited
 /// between them, starting at rest at the first path. `near` chooses the arm's branch. Errors:
-/// "plan.unreachable" naming path and point, and everything that preflight() refuses.
+/// "plan.unreachable" naming path and point, "plan.empty", "plan.too_long", and everything that preflight()
+/// refuses. A path that is too fast for the arm is slowed, never refused. Takes 0.2..2 s of computing: not
+/// for a real-time thread.
 Result<MotionPlan> plan_scan(const cell::CellSetup& cell, const std::vector<BeamPath>& paths, double top_z_mm,
                              double speed_mm_s, const kinematics::Joints& near);
 

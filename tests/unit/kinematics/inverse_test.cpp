@@ -165,6 +165,20 @@ TEST(InverseNear, FollowsAPathWithoutFlips) {
   EXPECT_FALSE(inverse_near(arm, pose, q, 0, 0.01, far)) << "100 mm is more than 0.01 rad";
 }
 
+TEST(Inverse, KnowsNoSolutionForWhatIsNoPose) {
+  const ArmModel arm = testing::irb2600_185();
+  const Joints start{rad(-20), rad(10), rad(5), rad(15), rad(70), rad(100)};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      Transform<Base, Flange> pose = forward(arm, start);
+      pose.iso.matrix()(row, column) = std::nan("");
+      Joints out{};
+      EXPECT_TRUE(inverse(arm, pose, start).empty()) << row << column;
+      EXPECT_FALSE(inverse_near(arm, pose, start, 0, 10, out)) << row << column;
+    }
+  }
+}
+
 TEST(Coupling, TurnsTheUpperArmWithTheLinkage) {
   ArmModel arm = testing::irb2600_185();
   const Joints serial{0.1, 0.2, -0.3, 0.4, 0.5, 0.6};

@@ -170,6 +170,10 @@ TEST(PlanScan, NamesWhatItCannotReach) {
   EXPECT_EQ(plan_scan(cell, {{"one point", {{900, 0}}, 0}}, kTop_mm, 200, cell.home).error().code,
             "plan.empty");
   EXPECT_EQ(plan_scan(cell, {paths[0]}, kTop_mm, 0, cell.home).error().code, "plan.speed");
+  EXPECT_EQ(plan_scan(cell, {paths[0]}, kTop_mm, 0.05, cell.home).error().code, "plan.too_long");
+  EXPECT_EQ(
+      plan_scan(cell, {{"lost", {{900, std::nan("")}, {980, 0}}, 0}}, kTop_mm, 200, cell.home).error().code,
+      "plan.too_long");
 }
 
 TEST(PlanScan, IsTheSameEveryTime) {
