@@ -45,6 +45,6 @@ function(weldcell_cad_program)
     target_compile_options(weldcell-cad PRIVATE -Wall -Wextra -Wshadow -Wconversion -Werror)
     target_link_libraries(weldcell-cad PRIVATE weldcell_files weldcell_workpiece dxflib
       TKXDESTEP TKXSBase TKXCAF TKLCAF TKHLR TKTopAlgo TKBRep TKGeomBase TKG3d TKG2d TKMath TKernel
-      TKSTEP TKSTEPAttr TKSTEP209 TKSTEPBase TKCDF TKCAF TKGeomAlgo)
+      TKMesh TKSTEP TKSTEPAttr TKSTEP209 TKSTEPBase TKCDF TKCAF TKGeomAlgo)
   endif()
 endfunction()

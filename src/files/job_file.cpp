@@ -51,6 +51,10 @@ void read_cad(Map& map, job::CadImport& cad) {
   }
   map.number("height_mm", cad.height_mm, {0.5, 2000});
   map.number("edge_radius_mm", cad.edge_radius_mm, {0, 200});
+  static constexpr Choice<const char*> kDrawn[] = {{"flat", "flat"}, {"silhouette", "silhouette"}};
+  const char* drawn = "";
+  map.choice("drawn", drawn, kDrawn);
+  cad.drawn = drawn;
   map.finish();
 }
 

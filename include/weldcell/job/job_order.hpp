@@ -19,6 +19,7 @@ struct CadImport {
   std::string units;          ///< "" = as the file says; mm | inch | m
   double height_mm = 0;       ///< needed for DXF; 0 = as the file says
   double edge_radius_mm = 0;
+  std::string drawn;          ///< DXF with round edges: which line is drawn, flat | silhouette; "" = found out
 };
 
 struct JobOrder {

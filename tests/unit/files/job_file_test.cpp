@@ -19,7 +19,7 @@ TEST(JobFile, ReadsEveryKey) {
   const std::string sha(64, 'a');
   const auto parsed = parse_job(
       "job: demo-017\nnumber: 17\nworkpiece: part.DXF\nrevision: sha256:" + sha +
-          "\ncad: {units: inch, height_mm: 40, edge_radius_mm: 4}\n"
+          "\ncad: {units: inch, height_mm: 40, edge_radius_mm: 4, drawn: flat}\n"
           "planned: {x_mm: 900, y_mm: -1.5, theta_deg: 90}\nguidance: {enabled: false}\n"
           "inspection: {pattern: spiral, span_mm: 81, pitch_mm: 41, speed_mm_s: 201, margin_mm: 16, "
           "margin_deg: 20, passes_per_member: 4}\n"
@@ -35,6 +35,7 @@ TEST(JobFile, ReadsEveryKey) {
   EXPECT_EQ(j.cad.units, "inch");
   EXPECT_DOUBLE_EQ(j.cad.height_mm, 40);
   EXPECT_DOUBLE_EQ(j.cad.edge_radius_mm, 4);
+  EXPECT_EQ(j.cad.drawn, "flat");
   ASSERT_TRUE(j.planned.has_value());
   EXPECT_NEAR(j.planned->theta_rad, kPi / 2, 1e-12);
   EXPECT_FALSE(j.guidance);
