@@ -1,96 +1,10 @@
+#include "wire/mcap_reader.hpp"
+
 #include <algorithm>
-#include <array>
-#include <unordered_map>
 
-#include <fmt/format.h>
-
-#include "weldcell/wire/mcap.hpp"
 #include "wire/crc32.hpp"
-#include "wire/mcap_format.hpp"
 
-namespace weldcell::wire {
-namespace {
-
-using mcap::Get;
-using mcap::kChunkHead;
-using mcap::kMagic;
-using mcap::kRecordHead;
-using mcap::Op;
-using mcap::View;
-
-constexpr const char* kMend = "use another copy of the file; the other parts were read";
-
-struct Record {
-  Op op{};
-  std::size_t at = 0;  ///< of the opcode
-  View content;
-  std::size_t end() const { return at + kRecordHead + content.size(); }
-};
-
-/// The three lengths that an uncompressed chunk states, and what belongs to them.
-struct ChunkHead {
-  std::uint64_t first_time = 0, last_time = 0;
-  std::uint32_t crc = 0, compression_size = 0;
-  std::array<std::uint64_t, 3> sizes{};  ///< by record length, uncompressed size, records length
-  /// The size on which at least two agree; false when no two do.
-  bool agreed(std::uint64_t& size) const {
-    for (std::size_t i = 0; i < 3; ++i) {
-      size = sizes[i];
-      if (sizes[i] == sizes[(i + 1) % 3]) return true;
-    }
-    return false;
-  }
-  bool consistent() const { return compression_size == 0 && sizes[0] == sizes[1] && sizes[1] == sizes[2]; }
-};
-
-class Reader {
- public:
-  explicit Reader(View file) : file_(file) {}
-  Result<McapFile> read();
-
- private:
-  View slice(std::size_t from, std::size_t to) const { return file_.subspan(from, to - from); }
-  std::uint8_t opcode(std::size_t at) const { return static_cast<std::uint8_t>(file_[at]); }
-  std::uint64_t length(std::size_t at) const { return Get(file_.subspan(at + 1, 8)).u64(); }
-  bool own() const { return out_.profile == mcap::kOwnProfile; }
-
-  void damage(const char* code, std::size_t from, std::size_t to, std::string what) {
-    out_.damage.push_back({code, fmt::format("bytes {}-{}", from, to), std::move(what), kMend});
-  }
-
-  void look_at_end();
-  std::size_t read_header();
-  void read_data(std::size_t at);
-  /// Handles the record there; answers where the next one begins, or file size to stop.
-  std::size_t step(std::size_t at);
-  std::size_t take_chunk(std::size_t at);
-  std::size_t take_whole_chunk(std::size_t at, const ChunkHead& head, std::size_t size);
-  std::size_t behind_indexes(std::size_t at) const;
-  std::size_t take_indexes(std::size_t at, const mcap::MessageIndexes& indexes, mcap::Chunk& chunk);
-  std::size_t take_attachment(std::size_t at);
-  std::size_t take_other(std::size_t at);
-  void take_records(std::size_t from, std::size_t to, mcap::MessageIndexes& indexes);
-  bool take_record(const Record& record, std::size_t chunk_start, mcap::MessageIndexes& indexes);
-  void take_data_end(std::size_t at);
-  void check_tail(std::size_t at);
-  void check_foreign_tail(std::size_t at);
-  void learn_channels();
-  std::size_t resync(std::size_t at);
-
-  bool chunk_head(std::size_t at, ChunkHead& out) const;
-  bool whole_chunk_at(std::size_t at) const;
-  bool attachment_at(std::size_t at, McapAttachment& out, mcap::Attachment& index) const;
-  bool data_end_at(std::size_t at) const;
-
-  View file_;
-  McapFile out_;
-  mcap::Summary summary_;                                   ///< as the data say
-  std::unordered_map<std::uint16_t, mcap::Channel> known_;  ///< also those that only the summary tells of
-  std::size_t limit_ = 0;                                   ///< end of what can be data or summary
-  bool ended_ = false;                                      ///< footer or final magic are there
-  std::size_t summary_start_ = 0, header_end_ = 0;
-  bool stop_ = false;
-};
+namespace weldcell::wire::mcap {
 
 Result<McapFile> Reader::read() {
   const std::size_t magic = std::min(file_.size(), kMagic.size());
@@ -105,40 +19,6 @@ Result<McapFile> Reader::read() {
   const std::size_t data = read_header();
   if (!stop_) read_data(data);
   return std::move(out_);
-}
-
-void Reader::look_at_end() {
-  limit_ = file_.size();
-  if (file_.size() < kMagic.size() + mcap::kTailBytes) return;
-  const std::size_t footer = file_.size() - mcap::kTailBytes;
-  const bool has_footer = opcode(footer) == static_cast<std::uint8_t>(Op::Footer) && length(footer) == 20;
-  const bool has_magic =
-      std::equal(kMagic.begin(), kMagic.end(), file_.end() - static_cast<std::ptrdiff_t>(kMagic.size()));
-  ended_ = has_footer || has_magic;
-  out_.complete = ended_;
-  if (!ended_) return;
-  limit_ = footer;
-  const std::uint64_t start = Get(file_.subspan(footer + kRecordHead, 8)).u64();
-  if (start >= kMagic.size() + mcap::kDataEndBytes && start <= footer)
-    summary_start_ = static_cast<std::size_t>(start);
-}
-
-/// A damaged chunk may hold the only other copy of a channel; the summary's is as good when its checksum
-/// holds.
-void Reader::learn_channels() {
-  if (summary_start_ == 0) return;
-  const std::size_t crc_at = limit_ + mcap::kFooterBytes - 4;
-  if (Get(file_.subspan(crc_at, 4)).u32() != crc32(slice(summary_start_, crc_at))) return;
-  for (std::size_t at = summary_start_; limit_ - at >= kRecordHead;) {
-    const std::uint64_t size = length(at);
-    if (size > limit_ - at - kRecordHead) return;
-    mcap::Channel channel;
-    const View content = file_.subspan(at + kRecordHead, static_cast<std::size_t>(size));
-    if (opcode(at) == static_cast<std::uint8_t>(Op::Channel) && mcap::get_channel(content, channel)) {
-      known_[channel.id] = channel;
-    }
-    at += kRecordHead + static_cast<std::size_t>(size);
-  }
 }
 
 std::size_t Reader::read_header() {
@@ -176,7 +56,7 @@ void Reader::read_data(std::size_t at) {
     at = step(at);
   }
   if (!stop_ && ended_)
-    damage("mcap.frame", std::min(at, limit_), limit_ + mcap::kFooterBytes, "the end of the data is missing");
+    damage("mcap.frame", std::min(at, limit_), limit_ + kFooterBytes, "the end of the data is missing");
 }
 
 std::size_t Reader::step(std::size_t at) {
@@ -194,25 +74,6 @@ std::size_t Reader::step(std::size_t at) {
   }
 }
 
-bool Reader::data_end_at(std::size_t at) const {
-  const bool sound = opcode(at) == static_cast<std::uint8_t>(Op::DataEnd) && length(at) == 4 &&
-                     file_.size() - at >= mcap::kDataEndBytes;
-  return sound || (ended_ && at + mcap::kDataEndBytes == summary_start_);
-}
-
-bool Reader::chunk_head(std::size_t at, ChunkHead& out) const {
-  Get get(file_.subspan(at + 1));
-  const std::uint64_t record = get.u64();
-  out.first_time = get.u64();
-  out.last_time = get.u64();
-  out.sizes[1] = get.u64();
-  out.crc = get.u32();
-  out.compression_size = get.u32();
-  out.sizes[2] = get.u64();
-  out.sizes[0] = record - kChunkHead;
-  return get.ok() && record >= kChunkHead;
-}
-
 std::size_t Reader::take_chunk(std::size_t at) {
   ChunkHead head;
   const std::size_t records = at + kRecordHead + kChunkHead;
@@ -227,7 +88,7 @@ std::size_t Reader::take_chunk(std::size_t at) {
   if (records > limit_ || size > limit_ - records) {
     if (ended_ || !head.consistent()) return resync(at);
     // Cut in the middle: the records that are whole are still good.
-    mcap::MessageIndexes indexes;
+    MessageIndexes indexes;
     take_records(records, file_.size(), indexes);
     stop_ = true;
     return file_.size();
@@ -245,10 +106,10 @@ std::size_t Reader::take_whole_chunk(std::size_t at, const ChunkHead& head, std:
     damage("mcap.crc", at, next, "a chunk's checksum does not fit its content");
     return next;
   }
-  mcap::MessageIndexes indexes;
+  MessageIndexes indexes;
   take_records(records, end, indexes);
-  mcap::Chunk chunk;
-  const Bytes expected = mcap::chunk_record(body, indexes, at, chunk);
+  Chunk chunk;
+  const Bytes expected = chunk_record(body, indexes, at, chunk);
   if (head.first_time != chunk.first_time || head.last_time != chunk.last_time) {
     damage("mcap.field", at + kRecordHead, at + kRecordHead + 16,
            "a chunk's times are not those of its messages");
@@ -258,17 +119,8 @@ std::size_t Reader::take_whole_chunk(std::size_t at, const ChunkHead& head, std:
   return next;
 }
 
-/// Where the index records end that begin there, whatever they say.
-std::size_t Reader::behind_indexes(std::size_t at) const {
-  while (limit_ - at >= kRecordHead && opcode(at) == static_cast<std::uint8_t>(Op::MessageIndex) &&
-         length(at) <= limit_ - at - kRecordHead) {
-    at += kRecordHead + static_cast<std::size_t>(length(at));
-  }
-  return at;
-}
-
-std::size_t Reader::take_indexes(std::size_t at, const mcap::MessageIndexes& indexes, mcap::Chunk& chunk) {
-  const Bytes expected = mcap::index_records(indexes, chunk);
+std::size_t Reader::take_indexes(std::size_t at, const MessageIndexes& indexes, Chunk& chunk) {
+  const Bytes expected = index_records(indexes, chunk);
   const std::size_t there = std::min(expected.size(), limit_ - at);
   const View found = file_.subspan(at, there);
   const auto first = std::mismatch(found.begin(), found.end(), expected.begin()).first;
@@ -282,7 +134,7 @@ std::size_t Reader::take_indexes(std::size_t at, const mcap::MessageIndexes& ind
   return at + there;
 }
 
-void Reader::take_records(std::size_t from, std::size_t to, mcap::MessageIndexes& indexes) {
+void Reader::take_records(std::size_t from, std::size_t to, MessageIndexes& indexes) {
   const bool cut = to == file_.size();
   for (std::size_t at = from; at < to;) {
     const bool fits = to - at >= kRecordHead && length(at) <= to - at - kRecordHead;
@@ -298,19 +150,19 @@ void Reader::take_records(std::size_t from, std::size_t to, mcap::MessageIndexes
   }
 }
 
-bool Reader::take_record(const Record& record, std::size_t chunk_start, mcap::MessageIndexes& indexes) {
+bool Reader::take_record(const Record& record, std::size_t chunk_start, MessageIndexes& indexes) {
   if (record.op == Op::Schema) {
-    mcap::Schema schema;
-    if (!mcap::get_schema(record.content, schema)) return false;
+    Schema schema;
+    if (!get_schema(record.content, schema)) return false;
     summary_.schemas.push_back(std::move(schema));
     return true;
   }
   if (record.op == Op::Channel) {
-    mcap::Channel channel;
-    if (!mcap::get_channel(record.content, channel)) return false;
+    Channel channel;
+    if (!get_channel(record.content, channel)) return false;
     if (known_.count(channel.id) != 0 && known_[channel.id].topic != channel.topic) return false;
     known_[channel.id] = channel;
-    const auto same = [&](const mcap::Channel& c) { return c.id == channel.id; };
+    const auto same = [&](const Channel& c) { return c.id == channel.id; };
     if (std::none_of(summary_.channels.begin(), summary_.channels.end(), same))
       summary_.channels.push_back(channel);
     return true;
@@ -335,7 +187,7 @@ bool Reader::take_record(const Record& record, std::size_t chunk_start, mcap::Me
   return true;
 }
 
-bool Reader::attachment_at(std::size_t at, McapAttachment& out, mcap::Attachment& index) const {
+bool Reader::attachment_at(std::size_t at, McapAttachment& out, Attachment& index) const {
   Get get(file_.subspan(at + kRecordHead));
   index.offset = at;
   index.log_time = get.u64();
@@ -355,7 +207,7 @@ bool Reader::attachment_at(std::size_t at, McapAttachment& out, mcap::Attachment
 
 std::size_t Reader::take_attachment(std::size_t at) {
   McapAttachment attachment;
-  mcap::Attachment index;
+  Attachment index;
   if (attachment_at(at, attachment, index)) {
     out_.attachments.push_back(std::move(attachment));
     const std::size_t end = at + static_cast<std::size_t>(index.length);
@@ -382,7 +234,7 @@ std::size_t Reader::take_other(std::size_t at) {
     return file_.size();
   }
   if (own() || !fits || opcode(at) == 0) return resync(at);
-  mcap::MessageIndexes unindexed;
+  MessageIndexes unindexed;
   const Record record{op, at, file_.subspan(at + kRecordHead, static_cast<std::size_t>(size))};
   if ((op == Op::Schema || op == Op::Channel || op == Op::Message) && !take_record(record, at, unindexed)) {
     damage("mcap.record", at, record.end(), "a record cannot be read");
@@ -390,82 +242,10 @@ std::size_t Reader::take_other(std::size_t at) {
   return record.end();
 }
 
-void Reader::take_data_end(std::size_t at) {
-  const std::size_t end = at + mcap::kDataEndBytes;
-  stop_ = true;
-  const bool sound = opcode(at) == static_cast<std::uint8_t>(Op::DataEnd) && length(at) == 4;
-  if (!sound) damage("mcap.frame", at, end, "the record that ends the data is damaged");
-  const std::uint32_t crc = Get(file_.subspan(at + kRecordHead, 4)).u32();
-  const bool right = crc == crc32(file_.first(at)) || (crc == 0 && !own());
-  if (sound && !right && out_.damage.empty()) {
-    // Chunks and attachments have checksums of their own and hold; what is left is the header, or the sum
-    // itself.
-    out_.damage.push_back(
-        {"mcap.crc", fmt::format("bytes {}-{} or {}-{}", kMagic.size(), own() ? header_end_ : at, at, end),
-         "the checksum of the data does not fit, though every part does", kMend});
-  }
-  if (own() && out_.damage.empty())
-    check_tail(end);
-  else if (ended_)
-    check_foreign_tail(end);
-}
+}  // namespace weldcell::wire::mcap
 
-void Reader::check_tail(std::size_t at) {
-  const Bytes expected = mcap::tail(summary_, at);
-  const View found = file_.subspan(at);
-  const std::size_t there = std::min(expected.size(), found.size());
-  const auto first =
-      std::mismatch(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(there), expected.begin())
-          .first;
-  const auto from = static_cast<std::size_t>(first - found.begin());
-  if (from < there)
-    damage("mcap.summary", at + from, file_.size(), "the summary does not fit the data");
-  else if (found.size() > expected.size())
-    damage("mcap.frame", at + there, file_.size(), "bytes behind the end");
-}
+namespace weldcell::wire {
 
-void Reader::check_foreign_tail(std::size_t at) {
-  const std::size_t crc_at = limit_ + mcap::kFooterBytes - 4;
-  const std::uint32_t crc = Get(file_.subspan(crc_at, 4)).u32();
-  const std::size_t from = std::min(at, limit_);
-  if (crc != 0 && summary_start_ != 0 && crc != crc32(slice(summary_start_, crc_at))) {
-    damage("mcap.summary", from, limit_ + mcap::kFooterBytes, "the checksum of the summary does not fit");
-  }
-  const std::size_t magic = file_.size() - kMagic.size();
-  if (!std::equal(kMagic.begin(), kMagic.end(), file_.begin() + static_cast<std::ptrdiff_t>(magic))) {
-    damage("mcap.magic", magic, file_.size(), "the file's last bytes are not MCAP's");
-  }
-}
-
-bool Reader::whole_chunk_at(std::size_t at) const {
-  ChunkHead head;
-  if (opcode(at) != static_cast<std::uint8_t>(Op::Chunk) || !chunk_head(at, head) || !head.consistent())
-    return false;
-  const std::size_t records = at + kRecordHead + kChunkHead;
-  if (records > limit_ || head.sizes[0] > limit_ - records) return false;
-  return head.crc == crc32(file_.subspan(records, static_cast<std::size_t>(head.sizes[0])));
-}
-
-std::size_t Reader::resync(std::size_t at) {
-  McapAttachment attachment;
-  mcap::Attachment index;
-  std::size_t next = at + 1;
-  for (; next + kRecordHead <= limit_; ++next) {
-    const bool found =
-        data_end_at(next) || whole_chunk_at(next) ||
-        (opcode(next) == static_cast<std::uint8_t>(Op::Attachment) && attachment_at(next, attachment, index));
-    if (found) break;
-  }
-  if (next + kRecordHead > limit_) {
-    next = limit_;
-    stop_ = true;
-  }
-  damage("mcap.frame", at, next, "bytes that are no record");
-  return next;
-}
-
-}  // namespace
-
-Result<McapFile> read_mcap(std::span<const std::byte> file) { return Reader(file).read(); }
+Result<McapFile> read_mcap(std::span<const std::byte> file) { return mcap::Reader(file).read(); }
 
 }  // namespace weldcell::wire
