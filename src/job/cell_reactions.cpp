@@ -25,6 +25,23 @@ wire::PackState pack_state(State state) {
   }
 }
 
+/// Empty for a number that is no command.
+std::string order_name(wire::PlcCommand order) {
+  using wire::PlcCommand;
+  switch (order) {
+    case PlcCommand::None: return "none";
+    case PlcCommand::Reset: return "reset";
+    case PlcCommand::Start: return "start";
+    case PlcCommand::Stop: return "stop";
+    case PlcCommand::Abort: return "abort";
+    case PlcCommand::Clear: return "clear";
+    case PlcCommand::Arm: return "arm";
+    case PlcCommand::Confirm: return "confirm";
+    case PlcCommand::Resume: return "resume";
+  }
+  return {};
+}
+
 }  // namespace
 
 bool Cell::fire(Event event) {
@@ -208,38 +225,46 @@ void Cell::finish_with(bool accepted, const std::string& verdict, const std::str
 
 int Cell::command(wire::PlcCommand order, const std::string& who) {
   constexpr int kDone = 0, kRefused = 1, kUnknown = 2;
+  const std::string name = order_name(order);
+  if (name.empty()) {
+    log(LogEvent::Level::Warning, "unknown command " + std::to_string(static_cast<int>(order)) + " from " + who);
+    return kUnknown;
+  }
+  log(LogEvent::Level::Info, name + " from " + who);
+  const std::string hindrance = obey(order, who);
+  if (hindrance.empty()) return kDone;
+  log(LogEvent::Level::Warning, name + " refused: " + hindrance);
+  return kRefused;
+}
+
+std::string Cell::obey(wire::PlcCommand order, const std::string& who) {
   using wire::PlcCommand;
-  const auto outcome = [&](bool taken) { return taken ? kDone : kRefused; };
-  log(LogEvent::Level::Info, "command " + std::to_string(static_cast<int>(order)) + " from " + who);
+  const std::string not_now = std::string("nothing waits for it in state ") + to_string(status_.state);
+  const auto outcome = [&](bool taken) { return taken ? std::string{} : not_now; };
   switch (order) {
-    case PlcCommand::None: return kDone;
-    case PlcCommand::Arm:
-      set_armed(true);
-      return kDone;
+    case PlcCommand::None:
+    case PlcCommand::Clear: return {};
+    case PlcCommand::Arm: set_armed(true); return {};
     case PlcCommand::Start:
     case PlcCommand::Resume: {
       const bool start = order == PlcCommand::Start;
       const bool waits = start ? status_.state == State::Ready
                                : status_.state == State::Faulted || status_.state == State::Interrupted;
-      const std::string hindrance = waits ? start_hindrance() : "no job waits for it";
-      if (!hindrance.empty()) {
-        log(LogEvent::Level::Warning, std::string(start ? "start" : "resume") + " refused: " + hindrance);
-        return kRefused;
-      }
+      if (!waits) return not_now;
+      if (const std::string hindrance = start_hindrance(); !hindrance.empty()) return hindrance;
       return outcome(fire(start ? Event::Start : Event::Resume));
     }
     case PlcCommand::Confirm: return outcome(fire(Event::Confirm));
     case PlcCommand::Reset: return outcome(fire(Event::Reset));
-    case PlcCommand::Clear: return kDone;
     case PlcCommand::Stop:
-      if (!under_way(status_.state)) return kRefused;
+      if (!under_way(status_.state)) return not_now;
       fault(FaultCode::StoppedByPerson, "stop from " + who);
-      return kDone;
+      return {};
     case PlcCommand::Abort:
       failure_ = "aborted by " + who;
       return outcome(fire(Event::Abort));
   }
-  return kUnknown;
+  return not_now;
 }
 
 std::string Cell::start_hindrance() const {

@@ -220,6 +220,8 @@ class Cell {
   void finish_with(bool accepted, const std::string& verdict, const std::string& reason);
   /// 0 done, 1 refused in this state, 2 unknown: the PLC's command_result.
   int command(wire::PlcCommand command, const std::string& who);
+  /// Why the command cannot be obeyed now; empty when it was.
+  std::string obey(wire::PlcCommand command, const std::string& who);
   void set_armed(bool armed);
   void request(RobotTask task);
   void begin_scan();

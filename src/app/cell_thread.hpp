@@ -1,0 +1,45 @@
+// The cell thread: drains the rings, steps the brain, carries out what it says, and writes the record. Ordinary priority.
+#pragma once
+
+#include <fstream>
+#include <memory>
+
+#include "app/wiring.hpp"
+#include "weldcell/adapters/journal_file.hpp"
+#include "weldcell/app/job_story.hpp"
+#include "weldcell/app/record.hpp"
+
+namespace weldcell::app {
+
+class CellThread {
+ public:
+  CellThread(Wiring& wiring, std::string arm_yaml);
+  /// Until wiring.stopping; then closes the record.
+  void run();
+
+ private:
+  void drain();
+  std::string feed(HostTime time, job::InputBody body);
+  void dispatch(const job::Outputs& outputs);
+  void dispatch(const job::Output& output);
+  void begin_job(const std::shared_ptr<const ActiveJob>& job);
+  void end_job(const job::FinishJob& finish);
+  void close_record();
+  void save(const job::SaveState& state);
+  void order_import();
+
+  Wiring& wiring_;
+  std::string arm_yaml_;
+  job::Cell cell_;
+  std::shared_ptr<const ActiveJob> active_;
+  std::shared_ptr<adapters::JournalFile> journal_;
+  std::unique_ptr<RecordWriter> record_;
+  std::shared_ptr<JobStory> story_;
+  std::string accepted_at_;
+  std::vector<std::shared_ptr<const plan::MotionPlan>> plans_;
+  std::uint64_t laser_lost_ = 0, egm_lost_ = 0;
+  HostTime last_tick_, solve_asked_;
+  std::string last_warning_;
+};
+
+}  // namespace weldcell::app

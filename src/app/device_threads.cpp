@@ -1,0 +1,193 @@
+#include "app/device_threads.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <thread>
+
+#include "weldcell/adapters/host_clock.hpp"
+#include "weldcell/adapters/laser_tcp.hpp"
+#include "weldcell/adapters/projector_png.hpp"
+#include "weldcell/adapters/projector_window.hpp"
+#include "weldcell/adapters/rws_http.hpp"
+#include "weldcell/app/robot_runner.hpp"
+
+namespace weldcell::app {
+
+namespace {
+
+constexpr Nanoseconds kPoll = 100 * kMillisecond;
+
+bool stopping(const Wiring& wiring) { return wiring.stopping.load(std::memory_order_relaxed); }
+
+void report_link(Wiring& wiring, job::Link link, bool up, const std::string& detail) {
+  // The cell must not miss a link: when its inbox is full, it is asked again at the next change of the device.
+  wiring.inbox.push({job::LinkChange{link, up, detail}, nullptr, nullptr});
+}
+
+}  // namespace
+
+void run_egm(Wiring& wiring, adapters::EgmSocket& socket) {
+  EgmItem item;
+  while (!stopping(wiring)) {
+    const adapters::EgmArrival got = socket.receive_newest(item.datagram, kPoll);
+    wiring.beat(ThreadName::Egm);
+    if (!got) continue;
+    if (const plan::MotionPlan* plan = wiring.offered_plan.exchange(nullptr, std::memory_order_acquire)) {
+      wiring.session.offer(plan);
+    }
+    item.arrival = got.arrival;
+    item.size = static_cast<std::uint16_t>(got.bytes);
+    const std::size_t size =
+        wiring.session.on_datagram(std::span(item.datagram).first(got.bytes), got.arrival, item.reply);
+    item.reply_size = static_cast<std::uint16_t>(size);
+    if (size > 0) socket.reply(std::span(item.reply).first(size));
+    item.report = wiring.session.report();
+    wiring.egm.push(item);
+  }
+}
+
+void run_laser(Wiring& wiring) {
+  const files::Endpoint& address = wiring.config.laser;
+  bool told_absent = false;
+  LaserItem item;
+  while (!stopping(wiring)) {
+    auto socket = adapters::LaserSocket::connect(address.host, address.port, kSecond);
+    wiring.beat(ThreadName::Laser);
+    if (!socket.ok()) {
+      if (!told_absent) spdlog::warn("laser: {}; trying again", socket.error().text());
+      told_absent = true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(500));
+      continue;
+    }
+    told_absent = false;
+    report_link(wiring, job::Link::Laser, true, fmt::format("{}:{}", address.host, address.port));
+    while (!stopping(wiring)) {
+      const adapters::LaserArrival got = socket->receive(item.bytes, kPoll);
+      wiring.beat(ThreadName::Laser);
+      if (got.event == adapters::LinkEvent::Timeout) continue;
+      if (got.event != adapters::LinkEvent::Data) break;
+      if (!wiring.wants_laser.load(std::memory_order_relaxed)) continue;
+      item.arrival = got.arrival;
+      item.size = static_cast<std::uint16_t>(got.bytes);
+      wiring.laser.push(item);
+    }
+    if (!stopping(wiring)) report_link(wiring, job::Link::Laser, false, socket->reason());
+  }
+}
+
+void run_rws(Wiring& wiring, const std::string& password, const std::string& resident_module) {
+  adapters::RwsAccess access;
+  access.host = wiring.config.rws.host;
+  access.port = wiring.config.rws.port;
+  access.user = wiring.config.rws_user;
+  access.password = password;
+  adapters::RwsHttp http(access);
+  adapters::RwsClient rws(http);
+  RobotRunner runner(rws, wiring.config.rws_task, resident_module);
+  std::optional<bool> link;
+  HostTime next_look;
+  constexpr Nanoseconds kLook = 2 * kSecond;
+  while (!stopping(wiring)) {
+    wiring.beat(ThreadName::Rws);
+    const HostTime now = adapters::now();
+    if (auto request = wiring.robot_requests.pop(std::chrono::milliseconds(runner.busy() ? 20 : 100))) {
+      // A stop never waits behind a move; a move never begins before the stop ahead of it has ended.
+      while (runner.busy() && request->task != job::RobotTask::Stop && !stopping(wiring)) {
+        if (const auto reply = runner.step(adapters::now())) wiring.inbox.push({*reply, nullptr, nullptr});
+        wiring.beat(ThreadName::Rws);
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      }
+      runner.begin(*request, adapters::now());
+    }
+    if (runner.busy()) {
+      if (const auto reply = runner.step(adapters::now())) wiring.inbox.push({*reply, nullptr, nullptr});
+      next_look = now + kLook;
+    } else if (now >= next_look) {
+      next_look = now + kLook;
+      const auto state = rws.controller_state();
+      if (link != state.ok()) {
+        link = state.ok();
+        report_link(wiring, job::Link::Rws, *link, state.ok() ? adapters::to_string(*state) : state.error().text());
+      }
+    }
+  }
+}
+
+void run_plc(Wiring& wiring, adapters::ModbusServer& server) {
+  wire::PlcOrder last;
+  bool told_order = false;
+  HostTime last_heartbeat_change, next_beat;
+  std::uint16_t own_heartbeat = 0, heard_heartbeat = 0;
+  bool link = false;
+  while (!stopping(wiring)) {
+    server.poll(50 * kMillisecond);
+    wiring.beat(ThreadName::Plc);
+    const HostTime now = adapters::now();
+    while (const auto words = server.take_order()) {
+      const wire::PlcOrder order = wire::decode_plc_order(*words, wiring.config.word_order);
+      if (!link || order.heartbeat != heard_heartbeat) last_heartbeat_change = now;
+      heard_heartbeat = order.heartbeat;
+      if (!link) {
+        link = true;
+        report_link(wiring, job::Link::Plc, true, "heartbeat");
+      }
+      if (!told_order || order.command_sequence != last.command_sequence || order.job_number != last.job_number) {
+        wiring.inbox.push({job::PlcInput{order}, nullptr, nullptr});
+      }
+      last = order;
+      told_order = true;
+    }
+    if (link && seconds(now - last_heartbeat_change) > wiring.config.plc_heartbeat_timeout_s) {
+      link = false;
+      told_order = false;
+      report_link(wiring, job::Link::Plc, false, "its heartbeat stands still");
+    }
+    if (now >= next_beat) {
+      next_beat = now + 500 * kMillisecond;
+      ++own_heartbeat;
+    }
+    wire::PlcStatus status = wiring.status().plc;
+    status.heartbeat = own_heartbeat;
+    server.set_status(wire::encode_plc_status(status, wiring.config.word_order));
+  }
+}
+
+void run_projector(Wiring& wiring) {
+  std::optional<adapters::ProjectorWindow> window;
+  if (wiring.config.projector_window) {
+    auto opened = adapters::ProjectorWindow::open();
+    if (opened.ok()) {
+      window.emplace(std::move(*opened));
+    } else {
+      spdlog::info("projector: {}; pictures go to the job's folder only", opened.error().text());
+    }
+  }
+  while (!stopping(wiring)) {
+    wiring.beat(ThreadName::Projector);
+    const auto shown = wiring.shown.pop(std::chrono::milliseconds(100));
+    if (window) window->pump();
+    if (!shown) continue;
+    if (window && !shown->drawing) window->blank();
+    if (!shown->drawing) continue;
+    if (window) {
+      const Status status = window->show(*shown->drawing);
+      if (!status.ok()) spdlog::warn("projector: {}", status.error().text());
+    }
+    const Status written =
+        adapters::write_png(*shown->drawing, shown->folder + fmt::format("/guidance-{:02}.png", shown->step));
+    if (!written.ok()) spdlog::warn("projector: {}", written.error().text());
+  }
+}
+
+void run_solver(Wiring& wiring) {
+  while (!stopping(wiring)) {
+    wiring.beat(ThreadName::Solver);
+    if (auto work = wiring.work.pop(std::chrono::milliseconds(100))) (*work)();
+  }
+}
+
+}  // namespace weldcell::app

@@ -1,0 +1,25 @@
+// The bodies of the daemon's device threads; each owns one adapter and speaks to the others through the wiring only.
+#pragma once
+
+#include <string>
+
+#include "app/wiring.hpp"
+#include "weldcell/adapters/egm_udp.hpp"
+#include "weldcell/adapters/modbus_server.hpp"
+
+namespace weldcell::app {
+
+/// Real-time: datagram in, reply out, item to the cell.
+void run_egm(Wiring& wiring, adapters::EgmSocket& socket);
+/// Keeps the laser connected and its bytes flowing to the cell while a scan wants them.
+void run_laser(Wiring& wiring);
+/// Robot requests over RWS, one at a time; between them it watches whether the controller answers.
+void run_rws(Wiring& wiring, const std::string& password, const std::string& resident_module);
+/// The PLC's server: orders to the cell, status back, heartbeats both ways.
+void run_plc(Wiring& wiring, adapters::ModbusServer& server);
+/// Window and PNG of what the worker sees.
+void run_projector(Wiring& wiring);
+/// Heavy steps, one after the other.
+void run_solver(Wiring& wiring);
+
+}  // namespace weldcell::app

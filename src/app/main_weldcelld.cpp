@@ -1,0 +1,161 @@
+// weldcelld: the cell controller daemon. Reads its configuration, makes the threads, keeps spool and control socket, and
+// stops in order.
+#include <malloc.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <sysexits.h>
+
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+
+#include "app/cell_thread.hpp"
+#include "app/command_line.hpp"
+#include "app/control.hpp"
+#include "app/device_threads.hpp"
+#include "app/places.hpp"
+#include "app/spool_keeper.hpp"
+#include "app/threads.hpp"
+#include "weldcell/adapters/host_clock.hpp"
+#include "weldcell/adapters/process_facts.hpp"
+#include "weldcell/adapters/systemd.hpp"
+#include "weldcell/job/state_table.hpp"
+#include "weldcell/rt/thread.hpp"
+
+namespace weldcell::app {
+
+namespace {
+
+volatile std::sig_atomic_t g_signal = 0;
+
+constexpr const char* kUsage =
+    "usage: weldcelld --config cell.yaml [--check] [--ports-file FILE]\n"
+    "       weldcelld --print-states\n"
+    "The weld cell controller. --check validates the configuration and exits; --print-states prints the job's state\n"
+    "machine as a Graphviz graph; --ports-file tells the ports that were taken, as JSON.\n";
+
+int refuse(const std::string& text) {
+  std::fprintf(stderr, "weldcelld: %s\n", text.c_str());
+  return EX_CONFIG;
+}
+
+/// The controller's password: credential, file, or none.
+Result<std::string> password_of(const files::CellConfig& config) {
+  auto credential = adapters::credential("rws-password");
+  if (credential.ok() || config.rws_password_file.empty()) return credential.ok() ? credential : Result<std::string>(std::string{});
+  return adapters::secret_file(config.rws_password_file);
+}
+
+/// Text of the arm's data file beside the cell file, for the record; empty when the cell file holds the arm itself.
+std::string arm_text(const files::CellConfig& config) {
+  const auto folder = std::filesystem::absolute(config.path).parent_path() / "robots" / (config.setup.arm.name + ".yaml");
+  const auto text = read_file(folder.string());
+  return text.ok() ? *text : std::string{};
+}
+
+Status write_ports(const std::string& path, const Wiring& wiring) {
+  if (path.empty()) return Done{};
+  return write_file_durably(path, fmt::format("{{\"egm\": {}, \"modbus\": {}}}\n", wiring.egm_port.load(), wiring.modbus_port.load()));
+}
+
+/// Asks for a controlled stop when something moves, and waits until it rests.
+void come_to_rest(Wiring& wiring, const SpoolKeeper&) {
+  if (!job::under_way(wiring.status().state)) return;
+  wiring.inbox.push({job::OperatorCommand{wire::PlcCommand::Stop, "daemon's end"}, nullptr, nullptr});
+  for (int i = 0; i < 30 && job::under_way(wiring.status().state); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));  // the ramp to rest, and RAPID's stop over RWS
+}
+
+int serve(const files::CellConfig& config, const std::string& ports_file) {
+  const auto password = password_of(config);
+  if (!password.ok()) return refuse(password.error().text());
+  const auto resident = read_file(shared_file("rapid/WeldcellEgm.mod"));
+  if (!resident.ok()) return refuse("the resident RAPID module is missing: " + resident.error().text());
+
+  std::error_code error;
+  std::filesystem::create_directories(config.state_dir, error);
+  auto spool = adapters::SpoolDir::open(config.spool_dir);
+  if (!spool.ok()) return refuse(spool.error().text());
+
+  const auto wiring = std::make_unique<Wiring>(config);
+  auto egm = adapters::EgmSocket::bind(config.egm.host, config.egm.port, config.egm_peer);
+  if (!egm.ok()) return refuse(egm.error().text());
+  adapters::ModbusOptions modbus_options;
+  modbus_options.host = config.modbus.host;
+  modbus_options.port = config.modbus.port;
+  auto modbus = adapters::ModbusServer::listen(modbus_options);
+  if (!modbus.ok()) return refuse(modbus.error().text());
+  wiring->egm_port = egm->port();
+  wiring->modbus_port = modbus->port();
+  auto control = open_control(*wiring);
+  if (!control.ok()) return refuse(control.error().text());
+  if (const Status told = write_ports(ports_file, *wiring); !told.ok()) return refuse(told.error().text());
+
+  CellThread cell(*wiring, arm_text(config));
+  auto threads = start_threads(*wiring, cell, *egm, *modbus, *password, *resident);
+  if (!threads.ok()) return refuse(threads.error().text());
+
+  SpoolKeeper keeper(*wiring, std::move(*spool));
+  spdlog::info("weldcelld {} serves cell '{}': EGM {}:{}, Modbus {}:{}, spool {}", WELDCELL_VERSION, config.setup.name,
+               config.egm.host, wiring->egm_port.load(), config.modbus.host, wiring->modbus_port.load(), config.spool_dir);
+  adapters::notify_ready("waiting for a job");
+  Watchdog watchdog;
+  while (g_signal == 0) {
+    keeper.step(50 * kMillisecond);
+    control->poll(50 * kMillisecond);
+    watchdog.step(*wiring, adapters::now());
+  }
+  adapters::notify_stopping("stopping: the robot comes to rest");
+  come_to_rest(*wiring, keeper);
+  wiring->stopping = true;
+  threads->clear();
+  keeper.put_away();
+  spdlog::info("ended; resident peak {} kB, cpu {:.1f} s", adapters::peak_rss_kb(), adapters::cpu_seconds());
+  return 0;
+}
+
+}  // namespace
+
+int weldcelld(Arguments arguments) {
+  CommandLine line(arguments, kUsage, {"config", "ports-file"}, {"check", "print-states"});
+  if (line.exit_code()) return *line.exit_code();
+  if (line.has("print-states")) {
+    std::fputs(job::states_dot().c_str(), stdout);
+    return 0;
+  }
+  if (!line.has("config")) return line.refuse("--config is missing");
+  auto read = files::read_cell_file(line.value("config"));
+  if (const auto* faults = std::get_if<files::Faults>(&read)) {
+    std::fprintf(stderr, "%s\n", files::text(*faults).c_str());
+    return EX_CONFIG;
+  }
+  const auto& config = std::get<files::CellConfig>(read);
+  if (line.has("check")) {
+    std::printf("%s: fine\n", line.value("config").c_str());
+    return 0;
+  }
+  return serve(config, line.value("ports-file"));
+}
+
+}  // namespace weldcell::app
+
+int main(int argc, char** argv) {
+  // Few arenas: the budget of the daemon is 100 MB resident.
+  ::mallopt(M_ARENA_MAX, 2);
+  auto logger = spdlog::stderr_logger_mt("weldcelld");
+  logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
+  logger->flush_on(spdlog::level::info);
+  spdlog::set_default_logger(logger);
+  struct sigaction action {};
+  action.sa_handler = [](int signal) { weldcell::app::g_signal = signal; };
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  try {
+    return weldcell::app::weldcelld(
+        weldcell::app::Arguments(const_cast<const char* const*>(argv) + 1, static_cast<std::size_t>(argc - 1)));
+  } catch (const std::exception& fault) {
+    std::fprintf(stderr, "weldcelld: %s\n", fault.what());
+    return 3;
+  }
+}

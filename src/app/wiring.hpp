@@ -1,0 +1,104 @@
+// Every queue of the daemon, with its capacity and what happens when it is full, and the few words that threads share.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "app/mailbox.hpp"
+#include "weldcell/files/cell_file.hpp"
+#include "weldcell/job/cell.hpp"
+#include "weldcell/robot/egm_session.hpp"
+#include "weldcell/rt/spsc_ring.hpp"
+
+namespace weldcell::app {
+
+/// One EGM cycle on its way from the real-time thread to the cell.
+struct EgmItem {
+  HostTime arrival;
+  robot::EgmReport report;
+  std::uint16_t size = 0, reply_size = 0;
+  std::array<std::byte, wire::kEgmMaxBytes> datagram{};
+  std::array<std::byte, 512> reply{};
+};
+
+struct LaserItem {
+  HostTime arrival;
+  std::uint16_t size = 0;
+  std::array<std::byte, 2048> bytes{};
+};
+
+/// A job in the spool's active/ folder.
+struct ActiveJob {
+  std::string folder;
+  job::JobArrived arrived;
+  std::string job_yaml;
+};
+
+/// Something for the cell from an ordinary thread.
+struct Message {
+  job::InputBody body;
+  std::shared_ptr<const ActiveJob> job;                 ///< with JobArrived
+  std::shared_ptr<std::promise<std::string>> outcome;   ///< with an operator's command: "" done, else why not
+};
+
+struct Shown {
+  std::shared_ptr<const guidance::Drawing> drawing;  ///< null: dark
+  int step = 0;
+  std::string folder;
+};
+
+/// A job that is over: main moves its folder.
+struct EndedJob {
+  std::string id;
+  bool accepted = false;
+};
+
+enum class ThreadName : std::size_t { Egm, Laser, Cell, Solver, Rws, Plc, Projector };
+inline constexpr std::size_t kThreads = 7;
+
+struct Wiring {
+  explicit Wiring(const files::CellConfig& c)
+      : config(c), setup(std::make_shared<const cell::CellSetup>(c.setup)), session(c.setup) {}
+
+  const files::CellConfig config;
+  const std::shared_ptr<const cell::CellSetup> setup;
+  robot::EgmSession session;  ///< cycles on the egm thread only; its stop and arm bits from any
+
+  // One second of data each. Full: the newest is dropped and counted; the cell turns a loss in a scan into a fault.
+  rt::SpscRing<EgmItem, 256> egm;
+  rt::SpscRing<LaserItem, 512> laser;
+
+  Mailbox<Message> inbox{1024};                           ///< full: the sender's command fails, a device thread tries again
+  Mailbox<job::RobotRequest> robot_requests{16};          ///< full: fault, the cell waits for an answer in vain
+  Mailbox<std::function<void()>> work{16};                ///< solver; full cannot happen: one order a job step
+  Mailbox<Shown> shown{16};                               ///< full: a picture is skipped
+  Mailbox<EndedJob> ended{64};
+
+  std::atomic<const plan::MotionPlan*> offered_plan{nullptr};  ///< cell -> egm; the cell keeps the plan alive
+  std::atomic<bool> stopping{false};
+  std::atomic<bool> wants_laser{false};
+  std::atomic<bool> takes_jobs{true};
+  std::array<std::atomic<std::uint64_t>, kThreads> heartbeats{};
+  std::atomic<int> egm_port{0}, modbus_port{0};
+
+  void beat(ThreadName thread) { heartbeats[static_cast<std::size_t>(thread)].fetch_add(1, std::memory_order_relaxed); }
+  job::CellStatus status() const {
+    const std::lock_guard lock(status_mutex);
+    return last_status;
+  }
+  void publish(const job::CellStatus& s) {
+    const std::lock_guard lock(status_mutex);
+    last_status = s;
+  }
+
+ private:
+  mutable std::mutex status_mutex;
+  job::CellStatus last_status;
+};
+
+}  // namespace weldcell::app

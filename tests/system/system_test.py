@@ -1,0 +1,287 @@
+"""Whole jobs on loopback: the daemon against the simulator, as a user runs them. One case a call."""
+import glob
+import json
+import math
+import os
+import random
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.dont_write_bytecode = True
+sys.path.insert(0, os.path.join(HERE, "../../scripts"))
+import demo as demo_module  # noqa: E402
+
+
+def check(truth, text):
+    if not truth:
+        raise AssertionError(text)
+
+
+def make(bin_dir, *arguments):
+    options = demo_module.parse(["--bin", bin_dir, "--free-ports", "--json", *arguments])
+    return demo_module.Demo(options)
+
+
+def centroid_error_mm(job, truth):
+    """Found against true place of the middle of the seams: the pose's origin is a corner, far from where it matters."""
+    points = [p for seam in truth["seams"] for p in seam["part_mm"]] if "part_mm" in truth["seams"][0] else [[600, 300], [0, 0]]
+    cx, cy = (sum(p[i] for p in points) / len(points) for i in (0, 1))
+
+    def place(pose):
+        a = math.radians(pose["theta_deg"])
+        return pose["x_mm"] + cx * math.cos(a) - cy * math.sin(a), pose["y_mm"] + cx * math.sin(a) + cy * math.cos(a)
+
+    (fx, fy), (tx, ty) = place(job["found"]), place(job["truth"])
+    return math.hypot(fx - tx, fy - ty)
+
+
+def check_good(demo, job):
+    check(job["verdict"] == "weld" and job["accepted"], f"verdict {job['verdict']}: {job['reason']}")
+    check(centroid_error_mm(job, demo.true) <= 0.25, f"pose off: {job['found']} against {job['truth']}")
+    check(abs(job["found"]["theta_deg"] - job["truth"]["theta_deg"]) <= 0.1, "theta off")
+    check(job["welds"] and len(job["seam_error_mm"]) == len(job["welds"]), f"welded {job['seams']}")
+    check(max(job["seam_error_mm"]) <= 0.5, f"torch off the seam: {job['seams']}")
+    for name in ("report.html", "record.mcap", "result.json", "WeldcellJob.mod", "guidance-01.png"):
+        check(os.path.getsize(os.path.join(job["folder"], name)) > 100, f"{name} is missing")
+
+
+def check_replay(demo, job):
+    weldcell = demo.program("weldcell")
+    same = subprocess.run([weldcell, "replay", job["record"]], capture_output=True, text=True)
+    check(same.returncode == 0 and same.stdout.startswith("identical"), f"replay: {same.stdout[:2000]} {same.stderr[:500]}")
+    with open(job["record"], "rb") as f:
+        data = bytearray(f.read())
+    rng = random.Random(7)
+    for at in [rng.randrange(8, len(data) - 8) for _ in range(3)]:
+        data[at] ^= 0x40
+        changed = os.path.join(demo.dir, "changed.mcap")
+        with open(changed, "wb") as f:
+            f.write(data)
+        data[at] ^= 0x40
+        out = subprocess.run([weldcell, "replay", changed], capture_output=True, text=True)
+        check(out.returncode in (1, 2), f"byte {at} changed and replay says {out.returncode}")
+        check("byte" in out.stdout + out.stderr, f"it does not say where: {out.stdout[:500]}")
+    page = os.path.join(demo.dir, "page.html")
+    subprocess.run([weldcell, "review", job["record"], "-o", page], check=True)
+    check(os.path.getsize(page) > 10000, "the page is empty")
+
+
+def demo_ladder(bin_dir):
+    demo = make(bin_dir, "--seed", "1")
+    try:
+        job = demo.run(1)
+        check_good(demo, job)
+        check_replay(demo, job)
+        check(job["rss_kb"] <= 100 * 1024, f"resident {job['rss_kb']} kB")
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
+def demo_mitre(bin_dir):
+    demo = make(bin_dir, "--seed", "2", "--cad", "mitre")
+    try:
+        check_good(demo, demo.run(2))
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
+def wait_state(demo, states, seconds):
+    begin = time.monotonic()
+    status = None
+    while time.monotonic() - begin < seconds:
+        status = demo.ask_status() or status
+        if status and status["state"] in states:
+            return status
+        time.sleep(0.1)
+    raise AssertionError(f"no state {states} within {seconds} s, last {status}")
+
+
+def operate(demo, order, expect=0):
+    out = subprocess.run([demo.program("weldcell"), "operate", order, "--config", demo.cell], capture_output=True, text=True)
+    check(out.returncode == expect, f"operate {order}: {out.returncode} {out.stderr}")
+    return out.stderr
+
+
+def arm_and_resume(demo):
+    operate(demo, "resume", expect=1)  # not armed: refused
+    wait = time.monotonic() + 20
+    operate(demo, "arm")
+    while True:
+        out = subprocess.run([demo.program("weldcell"), "operate", "resume", "--config", demo.cell], capture_output=True, text=True)
+        if out.returncode == 0:
+            return
+        check(time.monotonic() < wait, f"resume: {out.stderr}")
+        time.sleep(0.5)
+
+
+def finish(demo, name):
+    folder, status = demo.wait_for(name)
+    demo.end_truth()
+    return demo.gather(name, folder, status)
+
+
+def killed_in_scan(bin_dir):
+    demo = make(bin_dir, "--seed", "3")
+    try:
+        demo.start_sim(3)
+        demo.start_daemon()
+        name = demo.submit(3)
+        wait_state(demo, ["Scanning"], 120)
+        time.sleep(4)
+        demo.daemon.kill()
+        demo.daemon.wait()
+        check(os.path.isdir(os.path.join(demo.dir, "spool/active", name)), "the job left active/")
+        time.sleep(2)
+        demo.start_daemon()
+        status = wait_state(demo, ["Interrupted"], 20)
+        check(not status["armed"], "armed after a restart")
+        time.sleep(3)
+        check(demo.ask_status()["state"] == "Interrupted", "it moved on by itself")
+        arm_and_resume(demo)
+        job = finish(demo, name)
+        check_good(demo, {**job, "record": job["record"]})
+        records = sorted(glob.glob(os.path.join(job["folder"], "record*.mcap")))
+        check(len(records) == 2, f"records {records}")
+        cut = subprocess.run([demo.program("weldcell"), "replay", records[1]], capture_output=True, text=True)
+        check("no footer" in cut.stdout, f"the cut record: {cut.stdout[:500]}")
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
+def fault_in_scan(bin_dir, fault, seed, words):
+    demo = make(bin_dir, "--seed", str(seed), "--fault", fault)
+    try:
+        demo.start_sim(seed)
+        demo.start_daemon()
+        name = demo.submit(seed)
+        status = wait_state(demo, ["Faulted"], 180)
+        check(any(word in status["fault"] for word in words), f"fault text: {status['fault']}")
+        check(not status["armed"], "armed after a fault")
+        time.sleep(5)
+        check(demo.ask_status()["state"] == "Faulted", "it moved on by itself")
+        arm_and_resume(demo)
+        check_good(demo, finish(demo, name))
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
+def laser_lost_in_scan(bin_dir):
+    fault_in_scan(bin_dir, "laser_drop@scan+5:3", 4, ["laser"])
+
+
+def robot_stopped_in_scan(bin_dir):
+    fault_in_scan(bin_dir, "program_stop@scan+5", 5, ["EGM", "stop"])
+
+
+def bad_jobs(bin_dir):
+    demo = make(bin_dir)
+    try:
+        demo.start_sim(6)
+        demo.start_daemon()
+        wait_state(demo, ["Idle"], 20)
+        incoming = os.path.join(demo.dir, "spool/incoming")
+        cases = {
+            "typo": ("job: typo\nworkpiece: ladder.yaml\ninspektion: {pattern: zigzag}\n", ["typo.yaml:3", "inspektion", "inspection"]),
+            "nofile": ("job: nofile\nworkpiece: nothing.yaml\n", ["nothing.yaml"]),
+        }
+        for name, (text, _) in cases.items():
+            draft = os.path.join(incoming, f".{name}.tmp")
+            with open(draft, "w") as f:
+                f.write(text)
+            os.rename(draft, os.path.join(incoming, f"{name}.yaml"))
+        half = open(os.path.join(incoming, "half.yaml"), "w")
+        half.write("job: half\nworkp")
+        half.flush()
+        begin = time.monotonic()
+        for name, (_, words) in cases.items():
+            while not glob.glob(os.path.join(demo.dir, f"spool/rejected/{name}*.reason")):
+                check(time.monotonic() - begin < 60, f"{name} was not rejected: {os.listdir(incoming)}")
+                time.sleep(0.2)
+            reason = open(glob.glob(os.path.join(demo.dir, f"spool/rejected/{name}*.reason"))[0]).read()
+            for word in words:
+                check(word in reason, f"{name}: '{word}' is not in: {reason}")
+        check(os.path.exists(os.path.join(incoming, "half.yaml")), "a file still being written was taken")
+        half.close()
+        check(demo.ask_status()["state"] == "Idle", "the daemon did not stay idle")
+        # An unreachable plan: accepted, then failed with the reason.
+        far = demo.job_text.replace("planned: {x_mm: 1250", "planned: {x_mm: 4250")
+        check(far != demo.job_text, "the demonstration job has another planned pose")
+        demo.job_text = far
+        name = demo.submit(99)
+        folder, _ = demo.wait_for(name)
+        result = json.load(open(os.path.join(folder, "result.json")))
+        check("failed" in folder and "reach" in result["reason"], f"unreachable: {result['reason']}")
+        # The same name again.
+        demo.submit(99)
+        begin = time.monotonic()
+        while not glob.glob(os.path.join(demo.dir, "spool/rejected/*.reason*")) or \
+                not any("99" in p for p in glob.glob(os.path.join(demo.dir, "spool/rejected/*.reason"))):
+            check(time.monotonic() - begin < 60, "the second job of that name was not rejected")
+            time.sleep(0.2)
+        check(demo.daemon.poll() is None, "the daemon went down")
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
+def hostile_datagrams(bin_dir):
+    demo = make(bin_dir)
+    try:
+        demo.start_sim(7)
+        demo.start_daemon()
+        status = wait_state(demo, ["Idle"], 20)
+        rng = random.Random(11)
+        udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        for _ in range(2000):
+            size = rng.choice([0, 1, 7, 100, 486, 1399, 1400, 1401, 9000])
+            udp.sendto(rng.randbytes(size), ("127.0.0.1", status["ports"]["egm"]))
+        for target in (status["ports"]["modbus"],):
+            for _ in range(30):
+                tcp = socket.create_connection(("127.0.0.1", target))
+                tcp.sendall(rng.randbytes(rng.choice([1, 5, 8, 300])))
+                tcp.close()
+        time.sleep(1)
+        check(demo.daemon.poll() is None and demo.sim.poll() is None, "a program went down")
+        check(demo.ask_status()["state"] == "Idle", "the daemon is not idle")
+        name = demo.submit(7)
+        wait_state(demo, ["Scanning"], 120)
+        # Garbage from another address while the robot is guided: no reply, no harm.
+        for _ in range(500):
+            udp.sendto(rng.randbytes(rng.choice([1, 100, 486])), ("127.0.0.1", status["ports"]["egm"]))
+            time.sleep(0.002)
+        check_good(demo, finish(demo, name))
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
+def trials(bin_dir):
+    def run(threads):
+        out = subprocess.run([os.path.join(bin_dir, "weldcell"), "trials", "--workpiece", "ladder", "--count", "4", "--seed", "11",
+                              "--threads", str(threads), "--json"], capture_output=True, text=True)
+        check(out.returncode == 0, out.stderr)
+        return out.stdout
+
+    first, second = run(2), run(1)
+    check(first == second, f"two runs of one seed differ:\n{first}{second}")
+    result = json.loads(first)
+    check(result["failures"] == 0, f"failures: {first}")
+    check(result["x_mm"]["worst"] < 0.25 and result["y_mm"]["worst"] < 0.25 and result["theta_deg"]["worst"] < 0.1, first)
+
+
+def main():
+    check(len(sys.argv) == 4 and sys.argv[1] == "--bin", "usage: system_test.py --bin DIR CASE")
+    os.environ.setdefault("TMPDIR", tempfile.gettempdir())
+    globals()[sys.argv[3]](sys.argv[2])
+    print(f"{sys.argv[3]}: passed")
+
+
+main()

@@ -1,0 +1,228 @@
+#include "weldcell/job/cell.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace weldcell::job {
+namespace {
+
+workpiece::Workpiece part() {
+  workpiece::Workpiece w;
+  w.name = "bar";
+  w.height_mm = 40;
+  w.members.push_back({"bar", "1", {{0, 0}, {400, 0}, {400, 40}, {0, 40}}, 0});
+  workpiece::Weld weld;
+  weld.name = "w1";
+  weld.pieces.push_back({});
+  w.welds = {weld, weld};
+  return w;
+}
+
+std::shared_ptr<const Prepared> prepared() {
+  auto p = std::make_shared<Prepared>();
+  p->steps.resize(2);
+  p->step_poses.resize(2);
+  auto scan = std::make_shared<plan::MotionPlan>();
+  scan->id = 7;
+  scan->samples.resize(3);
+  p->scan = scan;
+  return p;
+}
+
+std::shared_ptr<const Solution> solution(localize::Verdict verdict) {
+  auto s = std::make_shared<Solution>();
+  s->found.verdict = verdict;
+  s->verdict = {verdict, "because"};
+  s->rapid = "MODULE";
+  return s;
+}
+
+/// Drives a cell and remembers what came out.
+class Driver {
+ public:
+  explicit Driver(bool plc_required = false) : cell(setup(), wire::Meas28Layout{}, plc_required) {}
+
+  static cell::CellSetup setup() {
+    cell::CellSetup s;
+    s.arm.c2 = 900;
+    return s;
+  }
+
+  Driver& feed(InputBody body, double after_s = 0.01) {
+    now = now + from_seconds(after_s);
+    last = cell.step({now, std::move(body)});
+    all.insert(all.end(), last.begin(), last.end());
+    return *this;
+  }
+  Driver& order(wire::PlcCommand c) { return feed(OperatorCommand{c, "test"}); }
+
+  template <typename T>
+  std::vector<T> of(const Outputs& outputs) const {
+    std::vector<T> found;
+    for (const Output& o : outputs) {
+      if (const T* t = std::get_if<T>(&o)) found.push_back(*t);
+    }
+    return found;
+  }
+
+  Driver& ready(bool guidance) {
+    JobArrived arrived;
+    arrived.id = arrived.order.name = "job";
+    arrived.order.guidance = guidance;
+    feed(LinkChange{Link::Laser, true, ""}).feed(LinkChange{Link::Rws, true, ""});
+    feed(arrived).feed(ImportDone{part()}).feed(PlanDone{prepared()});
+    return *this;
+  }
+
+  Driver& robot_done() {
+    const auto requests = of<RobotRequest>(all);
+    const auto it = std::find_if(requests.rbegin(), requests.rend(), [](const auto& r) { return r.task != RobotTask::Stop; });
+    RobotReply reply;
+    reply.id = it->id;
+    reply.ok = true;
+    return feed(reply);
+  }
+
+  State state() const { return cell.status().state; }
+
+  Cell cell;
+  HostTime now;
+  Outputs last, all;
+};
+
+bool moves(const Outputs& outputs) {
+  for (const Output& o : outputs) {
+    if (std::holds_alternative<StartMotion>(o)) return true;
+    const auto* r = std::get_if<RobotRequest>(&o);
+    if (r != nullptr && r->task != RobotTask::Stop && r->task != RobotTask::Query) return true;
+  }
+  return false;
+}
+
+TEST(Cell, MovesNothingBeforeArmAndStart) {
+  Driver d;
+  d.ready(true);
+  ASSERT_EQ(d.state(), State::Ready);
+  d.order(wire::PlcCommand::Start);
+  EXPECT_EQ(d.state(), State::Ready);
+  for (int i = 0; i < 100; ++i) d.feed(Tick{}, 1);
+  EXPECT_FALSE(moves(d.all));
+  d.order(wire::PlcCommand::Arm);
+  EXPECT_FALSE(moves(d.all));
+  d.order(wire::PlcCommand::Start);
+  EXPECT_EQ(d.state(), State::GuideMoving);
+  EXPECT_TRUE(moves(d.last));
+}
+
+TEST(Cell, StartNeedsItsLinks) {
+  Driver d(true);
+  d.ready(false).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Start);
+  EXPECT_EQ(d.state(), State::Ready) << "the PLC is missing";
+  d.feed(LinkChange{Link::Plc, true, ""}).feed(LinkChange{Link::Laser, false, "gone"}).order(wire::PlcCommand::Start);
+  EXPECT_EQ(d.state(), State::Ready) << "the laser is missing";
+  d.feed(LinkChange{Link::Laser, true, ""}).order(wire::PlcCommand::Start);
+  EXPECT_EQ(d.state(), State::PreparingScan);
+}
+
+TEST(Cell, GuidesStepByStepThenScans) {
+  Driver d;
+  d.ready(true).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Start);
+  d.robot_done();
+  EXPECT_EQ(d.state(), State::Placing);
+  EXPECT_EQ(d.cell.status().guide_step, 1);
+  d.order(wire::PlcCommand::Confirm).robot_done();
+  EXPECT_EQ(d.cell.status().guide_step, 2);
+  d.order(wire::PlcCommand::Confirm);
+  EXPECT_EQ(d.state(), State::PreparingScan);
+  ASSERT_FALSE(d.of<RobotRequest>(d.last).empty());
+  EXPECT_EQ(d.of<RobotRequest>(d.last).front().task, RobotTask::OpenScan);
+}
+
+TEST(Cell, AFaultStopsDisarmsAndKeepsTheJob) {
+  Driver d;
+  d.ready(false).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Start);
+  d.feed(Tick{}, 31);  // EGM never opens
+  EXPECT_EQ(d.state(), State::Faulted);
+  EXPECT_EQ(d.cell.status().fault, FaultCode::EgmNotStarted);
+  EXPECT_FALSE(d.cell.status().armed);
+  EXPECT_EQ(d.of<StopMotion>(d.last).size(), 1u);
+  EXPECT_FALSE(d.of<SetArmed>(d.last).front().armed);
+  const std::size_t before = d.all.size();
+  d.order(wire::PlcCommand::Resume);
+  EXPECT_EQ(d.state(), State::Faulted) << "not armed";
+  d.order(wire::PlcCommand::Arm).order(wire::PlcCommand::Resume);
+  EXPECT_EQ(d.state(), State::Importing);
+  d.feed(ImportDone{part()}).feed(PlanDone{prepared()});
+  EXPECT_EQ(d.state(), State::PreparingScan);
+  EXPECT_GT(d.all.size(), before);
+}
+
+TEST(Cell, AnInterruptedJobWaitsForArmAndResume) {
+  Driver d;
+  d.feed(LinkChange{Link::Laser, true, ""}).feed(LinkChange{Link::Rws, true, ""});
+  JobArrived arrived;
+  arrived.id = arrived.order.name = "job";
+  arrived.interrupted = true;
+  arrived.guidance_done = true;
+  d.feed(arrived);
+  EXPECT_EQ(d.state(), State::Interrupted);
+  d.order(wire::PlcCommand::Start).order(wire::PlcCommand::Confirm).order(wire::PlcCommand::Resume);
+  EXPECT_EQ(d.state(), State::Interrupted);
+  EXPECT_FALSE(moves(d.all));
+  d.order(wire::PlcCommand::Arm).order(wire::PlcCommand::Resume);
+  d.feed(ImportDone{part()}).feed(PlanDone{prepared()});
+  EXPECT_EQ(d.state(), State::PreparingScan) << "guidance was done";
+}
+
+TEST(Cell, APlcCommandCountsOnceAndOnlyWhenItsNumberChanges) {
+  Driver d;
+  wire::PlcOrder order;
+  order.command = wire::PlcCommand::Arm;
+  order.command_sequence = 5;
+  d.feed(PlcInput{order});
+  EXPECT_FALSE(d.cell.status().armed) << "what stood there at connection is no order";
+  order.command_sequence = 6;
+  d.feed(PlcInput{order});
+  EXPECT_TRUE(d.cell.status().armed);
+  EXPECT_EQ(d.cell.status().plc.command_ack, 6);
+  EXPECT_EQ(d.cell.status().plc.command_result, 0);
+  order.command = static_cast<wire::PlcCommand>(77);
+  order.command_sequence = 7;
+  d.feed(PlcInput{order});
+  EXPECT_EQ(d.cell.status().plc.command_result, 2);
+  order.command = wire::PlcCommand::Start;
+  order.command_sequence = 8;
+  d.feed(PlcInput{order});
+  EXPECT_EQ(d.cell.status().plc.command_result, 1);
+}
+
+TEST(Cell, AnUnreadableWorkpieceFailsTheJobAndStaysUp) {
+  Driver d;
+  JobArrived arrived;
+  arrived.id = arrived.order.name = "job";
+  d.feed(arrived).feed(ImportDone{Error{"cad.units", "a.dxf", "no units", "state them"}});
+  EXPECT_EQ(d.state(), State::Failed);
+  const auto finished = d.of<FinishJob>(d.last);
+  ASSERT_EQ(finished.size(), 1u);
+  EXPECT_FALSE(finished[0].accepted);
+  EXPECT_NE(finished[0].reason.find("no units"), std::string::npos);
+  EXPECT_NE(finished[0].reason.find("weld manually"), std::string::npos);
+  EXPECT_TRUE(d.cell.takes_jobs());
+}
+
+TEST(Cell, ALateAnswerOfAnEarlierRequestMovesNothing) {
+  Driver d;
+  d.ready(true).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Start);
+  const auto first = d.of<RobotRequest>(d.last).back();
+  d.order(wire::PlcCommand::Stop);
+  EXPECT_EQ(d.state(), State::Faulted);
+  RobotReply late;
+  late.id = first.id;
+  late.ok = true;
+  d.feed(late);
+  EXPECT_EQ(d.state(), State::Faulted);
+}
+
+}  // namespace
+}  // namespace weldcell::job
