@@ -54,6 +54,8 @@ Placed place(const Workpiece& workpiece, const Localization& found, const std::s
     out.covariance = pose.covariance;
     return out;
   }
+  // A pose without any spread is assumed, not measured: then the members are taken as drawn too.
+  if (found.members.empty() && found.covariance.isZero(0)) return out;
   const double s = options.unmeasured_shift_sigma_mm, t = options.unmeasured_angle_sigma_rad;
   out.covariance = Eigen::Vector3d(s * s, s * s, t * t).asDiagonal();
   return out;
@@ -305,11 +307,6 @@ std::vector<WeldCertificate> assume_exact(const Workpiece& workpiece, const Pose
   exact.cause = "assumed";
   exact.pose = pose;
   exact.centroid_base = pose.translation();
-  for (const Member& m : workpiece.members) {
-    localize::MemberPose pose_of_member;
-    pose_of_member.name = m.name;
-    exact.members.push_back(pose_of_member);
-  }
   return certify(workpiece, exact, options);
 }
 
