@@ -69,8 +69,10 @@ std::vector<std::string> advice(const ReportInput& input) {
   const auto say = [&](std::string_view text) {
     if (!text.empty() && std::find(out.begin(), out.end(), text) == out.end()) out.emplace_back(text);
   };
-  const bool done = input.verdict == Verdict::Weld && (input.state.empty() || input.state == "done");
-  if (done) return out;
+  const bool failed = input.state == "failed" || input.state == "aborted" || !input.cause.empty();
+  const bool doubted = input.found && input.verdict != Verdict::Weld;
+  const bool finished = input.state == "done" && input.verdict == Verdict::Weld;
+  if (finished || !(failed || doubted)) return out;
   say(advice_for(input.cause));
   if (input.found && input.found->verdict != Verdict::Weld && input.found->cause != input.cause) {
     say(advice_for(input.found->cause));
@@ -80,9 +82,13 @@ std::vector<std::string> advice(const ReportInput& input) {
       if (c.verdict == grave && (!input.found || input.found->verdict == Verdict::Weld)) say(c.reason);
     }
   }
-  if (input.verdict == Verdict::Rescan) say("Start the scan again; nothing has been welded.");
-  if (input.verdict == Verdict::Reject)
+  if (doubted && input.verdict == Verdict::Rescan) say("Start the scan again; nothing has been welded.");
+  // A device that failed says nothing about the part.
+  const bool of_the_part = input.found || input.cause.find('.') == std::string::npos ||
+                           input.cause.starts_with("weld.") || input.cause.starts_with("localize.");
+  if (input.verdict == Verdict::Reject && of_the_part && !(input.cause.empty() && !input.found)) {
     say("Weld this part manually, or put it right and start the job anew.");
+  }
   if (out.empty())
     say("Read the last events below, put the cause right, then arm the cell again and resume the job.");
   return out;

@@ -25,15 +25,33 @@ std::string section(const char* id, const char* title, const std::string& body, 
          (body.empty() ? fmt::format("<p class=\"note\">{}</p>\n", when_empty) : body) + "</section>\n";
 }
 
+struct Headline {
+  const char* words;
+  const char* style;
+};
+
+/// The verdict, or how far the job came when there is none.
+Headline headline(const ReportInput& in) {
+  const bool failed = in.state == "failed" || in.state == "aborted";
+  if (in.found && !(failed && in.verdict == localize::Verdict::Weld)) {
+    return {in_words(in.verdict), css_class(in.verdict)};
+  }
+  if (failed) return {in.found ? "Not finished" : "Not welded", "reject"};
+  if (in.state == "planned") return {"Planned", "open"};
+  if (in.state == "done") return {"Done", "weld"};
+  return {"Under way", "open"};
+}
+
 std::string head_of(const ReportInput& in) {
   std::string meta = escaped(in.workpiece.name);
   if (!in.state.empty()) meta += (meta.empty() ? "" : " &#183; ") + escaped(in.state);
   if (!in.accepted_at.empty())
     meta += (meta.empty() ? "" : " &#183; ") + ("accepted " + escaped(in.accepted_at));
   meta += (meta.empty() ? "" : " &#183; ") + ("weldcell " + escaped(in.program_version));
+  const Headline top = headline(in);
   return "<header class=\"top\"><h1>Job " + escaped(in.job) + "</h1><p class=\"meta\">" + meta + "</p>\n" +
-         fmt::format("<div class=\"verdict {}\" role=\"status\"><b>{}</b><span>{}</span></div>\n",
-                     css_class(in.verdict), in_words(in.verdict), escaped(in.reason));
+         fmt::format("<div class=\"verdict {}\" role=\"status\"><b>{}</b><span>{}</span></div>\n", top.style,
+                     top.words, escaped(in.reason));
 }
 
 std::string todo(const ReportInput& in) {
@@ -157,7 +175,7 @@ std::string report_html(const ReportInput& in) {
   }
   return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
          "content=\"width=device-width,initial-scale=1\"><title>Job " +
-         escaped(in.job) + ": " + in_words(in.verdict) + "</title><style>" + kStyle +
+         escaped(in.job) + ": " + headline(in).words + "</title><style>" + kStyle +
          "</style></head>\n<body>\n" + head_of(in) + todo(in) + numbers(in) +
          "<nav aria-label=\"Parts of this page\">" + links + "</nav></header>\n<main>\n" + body +
          "</main>\n<footer>Written by weldcell " + escaped(in.program_version) +

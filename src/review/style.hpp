@@ -20,6 +20,7 @@ p{margin:4px 0 10px}
 .verdict.weld{border-left-color:var(--ok)}.verdict.weld b{color:var(--ok)}
 .verdict.rescan{border-left-color:var(--again)}.verdict.rescan b{color:var(--again)}
 .verdict.reject{border-left-color:var(--no)}.verdict.reject b{color:var(--no)}
+.verdict.open{border-left-color:var(--blue)}.verdict.open b{color:var(--blue)}
 .todo{background:#fff8e5;border:1px solid #d9b44a;border-radius:10px;padding:12px 18px;margin:0 0 14px}
 .todo h2{font-size:17px}.todo ol{margin:4px 0;padding-left:22px}
 .numbers{display:grid;grid-template-columns:repeat(auto-fit,minmax(230px,1fr));gap:10px;margin:0 0 14px;padding:0}

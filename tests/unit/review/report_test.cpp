@@ -188,12 +188,36 @@ TEST(Advice, SaysWhatToDoForEachEnd) {
   EXPECT_THAT(advice(in).back(), HasSubstr("manually"));
   in.cause = "a_code_nobody_knows";
   EXPECT_FALSE(advice(in).empty());
+  in.cause = "laser.lost";
+  EXPECT_EQ(advice(in).size(), 1u) << "a lost laser says nothing about the part";
+  in = {};
+  in.state = "planned";
+  EXPECT_THAT(advice(in), IsEmpty());
   in = test::sample_input();
   in.verdict = Verdict::Rescan;
   in.certificates[2].verdict = Verdict::Rescan;
   in.certificates[2].reason = "weld w3: scan rung_2";
   EXPECT_EQ(advice(in)[0], "weld w3: scan rung_2");
   EXPECT_THAT(report_html(in), HasSubstr("What to do"));
+}
+
+TEST(Report, ItsHeadlineSaysHowFarTheJobCame) {
+  const auto words = [](ReportInput in) {
+    const std::string html = report_html(in);
+    std::smatch m;
+    return std::regex_search(html, m, std::regex("<b>([^<]*)</b>")) ? m[1].str() : "";
+  };
+  ReportInput none;
+  none.state = "planned";
+  EXPECT_EQ(words(none), "Planned");
+  none.state = "failed";
+  EXPECT_EQ(words(none), "Not welded");
+  auto in = test::sample_input();
+  EXPECT_EQ(words(in), "Weld");
+  in.state = "failed";
+  EXPECT_EQ(words(in), "Not finished") << "cleared, but the robot stopped";
+  in.verdict = Verdict::Rescan;
+  EXPECT_EQ(words(in), "Scan again");
 }
 
 TEST(Decimated, KeepsOrderEndsAndDropOuts) {
