@@ -26,16 +26,23 @@ Stretch own_part(const Run& run, const Candidates& found, std::size_t k) {
   return own;
 }
 
+Located locate(const Run& run, const Candidate& c, const Stretch& own, const EdgeOptions& options,
+               EdgeSummary& summary) {
+  if (crossing_of(run, c, options).square < kGlancing) {
+    ++summary.bad_fit;
+    return {};
+  }
+  if (c.beside_dropout && is_shadow(run, c, options)) return locate_by_shadow(run, c, options, summary);
+  return locate_by_model(run, c, own.from_mm, own.to_mm, options, summary);
+}
+
 void detect_by_model(const Run& run, const EdgeOptions& options, EdgeScan& out) {
   const Candidates found = find_candidates(run, options.height_mm, options.spot_mm);
   std::vector<Stretch> refused;
   for (std::size_t k = 0; k < found.steps.size(); ++k) {
     const Candidate& c = found.steps[k];
     ++out.summary.candidates;
-    const Stretch own = own_part(run, found, k);
-    const Located located = c.beside_dropout
-                                ? locate_by_shadow(run, c, options, out.summary)
-                                : locate_by_model(run, c, own.from_mm, own.to_mm, options, out.summary);
+    const Located located = locate(run, c, own_part(run, found, k), options, out.summary);
     if (located.accepted) {
       add_edge(run, located, c.step, options, out);
     } else {

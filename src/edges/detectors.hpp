@@ -21,6 +21,10 @@ struct Located {
 Located locate_by_model(const Run& run, const Candidate& candidate, double from_mm, double to_mm,
                         const EdgeOptions& options, EdgeSummary& summary);
 
+/// Cosine between travel and normal below which a crossing is glancing: its place along the travel says
+/// little.
+inline constexpr double kGlancing = 0.3;
+
 /// How the beam crosses the edge, as far as it is known.
 struct Crossing {
   bool normal_known = false;

@@ -11,7 +11,7 @@ constexpr double kReach = 8.0;         // mm of plateau used on each side: more 
 constexpr double kShortReach = 3.0;    // second try, when something else stands on the plateau
 constexpr double kLeastPlateau = 0.8;  // mm on each side
 constexpr double kGroup = 0.125;       // of the blur: readings closer than this are averaged
-constexpr double kWidestBlur = 4.0;    // times the expected: a ramp, not a step
+constexpr double kWidestBlur = 3.5;    // times the expected: a ramp, not a step
 constexpr double kMostOutliers = 0.35;
 constexpr double kMostChi2 = 9.0;
 constexpr double kWidestBracket = 2.0;  // mm without a reading at the step
@@ -136,10 +136,13 @@ namespace {
 
 /// A shadow that ends before the spot has left the upper side darkens no reading, but moves the crossing
 /// outwards by half its length.
-void correct_short_shadow(const Run& run, const Candidate& c, const EdgeOptions& options, Located& located) {
+void correct_short_shadow(const Run& run, const Candidate& c, const EdgeOptions& options, double bracket_mm,
+                          Located& located) {
   const Crossing crossing = crossing_of(run, c, options);
   const double longest = kDarkens * expected_blur(options) / crossing.square;
-  if (crossing.hidden_mm <= longest + 0.5) {
+  // Where readings stand that a shadow as long as this would have darkened, the sensor throws none.
+  const double dark = crossing.hidden_mm - longest;
+  if (dark < 0.6 || bracket_mm > 0.3 * dark) {
     located.s_mm += c.step * 0.5 * crossing.hidden_mm;
     located.sigma_mm = std::hypot(located.sigma_mm, 0.05 * crossing.hidden_mm);
   }
@@ -172,7 +175,7 @@ Located locate_by_model(const Run& run, const Candidate& c, double from_mm, doub
       return out;
     }
     out = {true, jump.s_mm, jump.bracket_mm / std::sqrt(12.0), jump.high_mm, jump.low_mm, false};
-    correct_short_shadow(run, c, options, out);
+    correct_short_shadow(run, c, options, jump.bracket_mm, out);
     return out;
   }
   const auto fit_with_reach = [&](double reach) {
@@ -193,7 +196,7 @@ Located locate_by_model(const Run& run, const Candidate& c, double from_mm, doub
   out.sigma_mm = fit.sigma_mm * std::sqrt(std::max(1.0, fit.chi2));
   out.top_mm = fit.model.high_mm + fit.model.slope * fit.model.position_mm;
   out.table_mm = fit.model.low_mm + fit.model.slope * fit.model.position_mm;
-  correct_short_shadow(run, c, options, out);
+  correct_short_shadow(run, c, options, fit.bracket_mm, out);
   return out;
 }
 

@@ -11,8 +11,8 @@ constexpr double kIsland = 0.3;          // mm of drop-out that ends the upper s
 constexpr double kSurelyTowards = 0.25;  // cosine beyond which even a short drop-out is a shadow
 constexpr double kSurelyAway = -0.6;     // cosine below which no oblique edge throws one, its normal unknown
 constexpr int kExposureReadings = 5;  // that the sensor's exposure control may lose at a change of brightness
-constexpr double kLeastSquare = 0.2;  // cosine between travel and a normal that it can be said to cross
-constexpr double kUnclear = 0.1;      // two normals whose cosines differ less cannot be told apart
+constexpr double kOutlineReach =
+    6.0;  // mm between a candidate and the side of the outline that it is taken for
 constexpr double kThresholdSpread =
     0.5;  // of the blur: how well light_threshold is known (2 % .. 15 % of the light)
 constexpr double kRoundingFrom = 0.9,
@@ -103,30 +103,27 @@ double corner_radius(const Run& run, const Candidate& c, double s_mm, double squ
 
 Crossing crossing_of(const Run& run, const Candidate& c, const EdgeOptions& options) {
   const align::SurfacePoint& p = run.points[std::min(index_at(run, c.s_mm), run.points.size() - 1)];
+  const Vec2 at(static_cast<double>(p.x_mm), static_cast<double>(p.y_mm));
   const Vec2 travel = Vec2(static_cast<double>(p.vx_mm_s), static_cast<double>(p.vy_mm_s)) / speed_mm_s(p);
   const Vec2 receiver(static_cast<double>(p.receiver_x), static_cast<double>(p.receiver_y));
   Crossing out;
-  double best = 0;
-  for (const Vec2& n : options.normals) best = std::max(best, std::abs(n.dot(travel)));
-  out.normal_known = best > kLeastSquare;
-  out.square = 1;
   out.towards = c.step * travel.dot(receiver);
-  if (out.normal_known) {
-    // Of two normals that the travel crosses alike, a drop-out speaks for the one that explains it.
-    bool first = true;
-    for (const Vec2& n : options.normals) {
-      const double along = n.dot(travel), square = std::abs(along);
-      if (square < best - kUnclear) continue;
-      const double towards = c.step * (along > 0 ? 1 : -1) * n.dot(receiver);
-      if (first || (c.beside_dropout ? towards > out.towards : towards < out.towards)) {
-        out.square = square;
-        out.towards = towards;
-      }
-      first = false;
-    }
+  double nearest = kOutlineReach;
+  for (const Segment& side : options.outline) {
+    const double away = distance(at, side);
+    if (away >= nearest) continue;
+    const Vec2 along = side.direction();
+    const Vec2 inward(-along.y(), along.x());
+    const double square = c.step * inward.dot(travel);
+    // The step's sign excludes the sides that the beam would cross the other way.
+    if (square <= 0) continue;
+    nearest = away;
+    out.normal_known = true;
+    out.square = square;
+    out.towards = inward.dot(receiver);
   }
-  out.hidden_mm =
-      options.height_mm * std::tan(options.triangulation_rad) * std::max(0.0, out.towards) / out.square;
+  out.hidden_mm = options.height_mm * std::tan(options.triangulation_rad) * std::max(0.0, out.towards) /
+                  std::max(out.square, kGlancing);
   return out;
 }
 

@@ -27,7 +27,7 @@ edges::EdgeOptions options_for(const StepProfile& p, edges::Method method) {
   o.spot_mm = p.spot_mm;
   o.noise_mm = p.noise_mm;
   o.triangulation_rad = p.triangulation_rad;
-  o.normals = {Vec2(1, 0)};
+  o.outline = edges::bar_outline(p);
   return o;
 }
 

@@ -31,11 +31,12 @@ struct EdgeOptions {
   double min_speed_mm_s = 20;    ///< slower stretches are not searched
   double time_sigma_s = 20e-6;   ///< alignment noise, added to each edge's sigma as speed * time_sigma_s
   double model_sigma_mm = 0.02;  ///< what the edge model itself may be wrong by, added to each edge's sigma
-  /// Directions (Base, either sign) of the outline's normals where they are known, e.g. from a first
-  /// localization. The receiver sees a step's foot or not depending on the angle between it and the edge's
-  /// normal: with normals a shadow too short to darken a reading is corrected; without them each edge's sigma
-  /// allows for one.
-  std::vector<Vec2> normals;
+  /// The outline's visible edges in Base (material to the left of a -> b) where they are known to a few
+  /// millimetres, e.g. from a first localization; may be empty. Whether the receiver sees a step's foot
+  /// depends on the angle between it and the edge's normal: with the outline a shadow too short to darken a
+  /// reading is corrected, an oblique one measured along the normal and a glancing crossing refused; without
+  /// it each edge's sigma allows for a short shadow.
+  std::vector<Segment> outline;
   double light_threshold = 0.06;  ///< share of the spot's light below which the sensor reports an error code
 };
 

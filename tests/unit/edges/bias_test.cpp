@@ -17,7 +17,7 @@ EdgeOptions options_for(const StepProfile& p) {
   o.noise_mm = p.noise_mm;
   o.triangulation_rad = p.triangulation_rad;
   o.light_threshold = p.threshold;
-  o.normals = {Vec2(1, 0)};
+  o.outline = bar_outline(p);
   return o;
 }
 
@@ -116,10 +116,7 @@ TEST(Oblique, ReceiverAcrossTheTravelOfATurnedBar) {
       const double across = p.width_mm / std::cos(p.turned_rad);
       for (const bool known : {true, false}) {
         EdgeOptions o = options_for(p);
-        o.normals.clear();
-        if (known)
-          o.normals = {Vec2(std::cos(p.turned_rad), std::sin(p.turned_rad)),
-                       Vec2(-std::sin(p.turned_rad), std::cos(p.turned_rad))};
+        if (!known) o.outline.clear();
         double left = 0, right = 0, pull = 0;
         for (int i = 0; i < 4; ++i) {
           p.phase = uniform(random);

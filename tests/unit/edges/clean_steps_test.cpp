@@ -17,7 +17,7 @@ EdgeOptions options_for(const StepProfile& p) {
   o.noise_mm = p.noise_mm;
   o.triangulation_rad = p.triangulation_rad;
   o.light_threshold = p.threshold;
-  o.normals = {Vec2(1, 0)};
+  o.outline = bar_outline(p);
   o.model_sigma_mm = 0;
   o.time_sigma_s = 0;
   return o;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "weldcell/align/aligner.hpp"
+#include "weldcell/geometry/plane.hpp"
 
 namespace weldcell::edges {
 
@@ -33,6 +34,13 @@ inline double bar_height(const StepProfile& p, double x) {
   if (inside >= p.radius_mm) return p.height_mm;
   const double d = p.radius_mm - inside;
   return p.height_mm - p.radius_mm + std::sqrt(p.radius_mm * p.radius_mm - d * d);
+}
+
+/// The bar's two sides as they lie across the travel, material to the left.
+inline std::vector<Segment> bar_outline(const StepProfile& p) {
+  const Vec2 normal(std::cos(p.turned_rad), std::sin(p.turned_rad)), along(-normal.y(), normal.x());
+  const Vec2 far = p.width_mm * normal;
+  return {{100 * along, -100 * along}, {far - 100 * along, far + 100 * along}};
 }
 
 /// Whether the receiver, towards direction `toward` in x, sees the surface point at x.
