@@ -202,7 +202,7 @@ std::vector<std::byte> ControllerState::egm_frame() {
   frame.measured = servo.posture_at(measured_at);
   frame.feedback_us = device_us(measured_at) + std::llround(truth.feedback_latency_ms * 1e3);
   frame.planned = reference;
-  frame.planned_us = device_us(now) + std::llround(truth.dead_time_ms * 1e3);
+  frame.planned_us = device_us(now) + std::llround(truth.dead_time_ms * 1e3 + cycle_s * 1e6);
   frame.motors_on = motors_on();
   frame.rapid_running = task.running();
   return egm.frame(frame);

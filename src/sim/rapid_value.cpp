@@ -258,6 +258,8 @@ Result<Value> parse_literal(std::string_view text) { return LiteralReader(text).
 std::string print(const Value& value) {
   switch (value.kind) {
     case Value::Kind::Number: {
+      // "Not used" of an external axis, which single precision cannot hold exactly.
+      if (value.number == static_cast<double>(9e9F)) return "9E+09";
       char text[40];
       std::snprintf(text, sizeof text, "%.9G", value.number);
       return text;

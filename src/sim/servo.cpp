@@ -8,7 +8,7 @@ namespace weldcell::sim {
 using kinematics::Joints;
 
 Servo::Servo(double cycle_s, double dead_time_s, const Joints& at)
-    : cycle_s_(cycle_s), delay_cycles_(std::clamp(dead_time_s / cycle_s, 0.0, 60.0)) {
+    : cycle_s_(cycle_s), delay_cycles_(1 + std::clamp(dead_time_s / cycle_s, 0.0, 60.0)) {
   line_.fill(at);
   record_.fill(at);
 }

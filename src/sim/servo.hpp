@@ -13,7 +13,8 @@ class Servo {
  public:
   Servo(double cycle_s, double dead_time_s, const kinematics::Joints& at);
 
-  /// The reference of this cycle; afterwards posture() is the arm's at `now`.
+  /// The reference computed in this cycle: the arm is there one cycle and the dead time later. Afterwards
+  /// posture() is the arm's at `now`.
   void step(HostTime now, const kinematics::Joints& reference);
   const kinematics::Joints& posture() const { return record_[at_]; }
   /// Cubic between cycles. Known for the last two seconds, and ahead as far as the dead time: what the arm

@@ -93,7 +93,9 @@ double Surface::height(double x_mm, double y_mm) const {
 
 Surface::Around Surface::classify(const Vec2& center) const {
   const double cell = kCell_mm * 0.7072;
-  const bool top = height(center.x(), center.y()) >= height_mm_;
+  const double here = height(center.x(), center.y());
+  const bool top = here >= height_mm_;
+  if (here > 0 && !top) return Around::Edge;
   for (const Body& body : bodies_) {
     const double reach = cell + reach_mm_ + body.radius_mm;
     if (center.x() < body.box.min.x() - reach || center.x() > body.box.max.x() + reach ||
@@ -144,12 +146,29 @@ double Surface::cast(const Eigen::Vector3d& from, const Eigen::Vector3d& directi
 bool Surface::sees(const Eigen::Vector3d& point, const Eigen::Vector3d& eye) const {
   const double to_top = top_mm() - point.z();
   if (to_top <= 0 || eye.z() <= point.z()) return true;
-  const Eigen::Vector3d step = (eye - point) / (eye.z() - point.z());
-  constexpr int kSteps = 24;
-  for (int i = 1; i <= kSteps; ++i) {
-    const double rise = to_top * i / kSteps;
-    const Eigen::Vector3d at = point + rise * step;
-    if (height(at.x(), at.y()) > at.z() - table_mm_ + 1e-6) return false;
+  const Vec2 from = point.head<2>();
+  const Vec2 way = (eye - point).head<2>() * (to_top / (eye.z() - point.z()));
+  for (const Body& body : bodies_) {
+    // The part of the way, from the point up to the height of the tops, that lies over this body.
+    double in = 0, out = 1;
+    for (const Side& side : body.sides) {
+      if (!body.convex) break;
+      const double at = side.inward.dot(from) - side.offset, rate = side.inward.dot(way);
+      if (std::abs(rate) < 1e-12) {
+        if (at < 0) in = 2;
+      } else if (rate > 0) {
+        in = std::max(in, -at / rate);
+      } else {
+        out = std::min(out, -at / rate);
+      }
+    }
+    if (in >= out - 1e-9) continue;
+    if (body.convex && body.radius_mm == 0) return false;
+    constexpr int kSteps = 8;
+    for (int i = 1; i <= kSteps; ++i) {
+      const double t = in + (out - in) * (i - 0.5) / kSteps;
+      if (height_of(body, from + t * way) > point.z() - table_mm_ + t * to_top + 1e-6) return false;
+    }
   }
   return true;
 }
