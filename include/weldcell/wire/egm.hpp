@@ -1,5 +1,5 @@
-// EGM datagrams <-> structs, RobotWare 6.07 to 7.16. Pure; real-time safe once made: messages are reused and their
-// memory is taken by the constructor.
+// EGM datagrams <-> structs, RobotWare 6.07 to 7.16. Pure; real-time safe once made: messages are reused and
+// their memory is taken by the constructor.
 #pragma once
 
 #include <array>
@@ -18,12 +18,12 @@ enum class RapidState : std::uint8_t { Undefined = 0, Stopped = 1, Running = 2 }
 /// What one EgmRobot message says. Degrees and millimetres as on the wire.
 struct EgmFeedback {
   std::uint32_t seqno = 0;
-  std::uint32_t tm_ms = 0;                      ///< controller's clock at sending; wraps
-  std::array<double, 6> joints_deg{};           ///< measured
-  std::array<double, 6> planned_deg{};          ///< controller's reference; equals joints_deg when absent
-  std::int64_t time_us = -1;                    ///< measurement instant, controller's uptime clock; -1 when absent
-  std::array<double, 3> position_mm{};          ///< measured TCP of the active tool; zeros when absent
-  std::array<double, 4> orientation{1, 0, 0, 0};///< w x y z
+  std::uint32_t tm_ms = 0;              ///< controller's clock at sending; wraps
+  std::array<double, 6> joints_deg{};   ///< measured
+  std::array<double, 6> planned_deg{};  ///< controller's reference; equals joints_deg when absent
+  std::int64_t time_us = -1;            ///< measurement instant, controller's uptime clock; -1 when absent
+  std::array<double, 3> position_mm{};  ///< measured TCP of the active tool; zeros when absent
+  std::array<double, 4> orientation{1, 0, 0, 0};  ///< w x y z
   MotorState motors = MotorState::Undefined;
   MciState mci = MciState::Undefined;
   RapidState rapid = RapidState::Undefined;

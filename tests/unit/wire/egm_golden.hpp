@@ -1,5 +1,5 @@
-// EGM datagrams as bytes, made by an encoder of its own (not by protobuf), one line a field of the outer message.
-// Measured joints 0 -20.5 10.25 0 60 -180; planned 0.125 -20 10.5 0 60.5 -180; TCP 1084.5 0 1245.25;
+// EGM datagrams as bytes, made by an encoder of its own (not by protobuf), one line a field of the outer
+// message. Measured joints 0 -20.5 10.25 0 60 -180; planned 0.125 -20 10.5 0 60.5 -180; TCP 1084.5 0 1245.25;
 // quaternion 0.5 0.5 -0.5 0.5.
 #pragma once
 
