@@ -62,7 +62,7 @@ BeamTrack track(const cell::CellSetup& cell, RobotClock& clock, const ClockPiece
     const auto step = clock.step(p);
     if (!step) continue;
     if (step->restarted) ++piece;
-    const HostTime time = pieces.maps[piece].to_host(step->device_ns);
+    const HostTime time = pieces.maps[piece].to_host(step->device_ns) - clock.send_age_ns();
     if (time <= last) continue;
     last = time;
     kinematics::Joints joints{};

@@ -41,9 +41,13 @@ class RobotClock {
   /// nullopt: the message repeats or precedes an earlier one and is left out.
   std::optional<DeviceStep> step(const StampedFeedback& pose);
   void rewind() { first_ = true; }
+  /// How much older the measurement is than the sending of its frame: feedBack.time against tm, which run from one
+  /// origin (EGM wire facts), half a millisecond at worst; 0 where the two do not go together.
+  Nanoseconds send_age_ns() const { return send_age_ns_; }
 
  private:
   bool has_time_ = false, first_ = true;
+  Nanoseconds send_age_ns_ = 0;
   double tm_zero_ns_ = 0, tm_period_ns_ = 0;  ///< 0: sequence and tm do not go together, tm is used as it is
   std::uint32_t seqno_zero_ = 0, tm_zero_ms_ = 0;
   std::int64_t device_ns_ = 0, arrival_ns_ = 0;

@@ -14,6 +14,7 @@
 #include "app/places.hpp"
 #include "weldcell/app/virtual_cell.hpp"
 #include "weldcell/base/units.hpp"
+#include "weldcell/files/edge_file.hpp"
 #include "weldcell/sim/scene.hpp"
 
 namespace weldcell::app {
@@ -57,6 +58,21 @@ std::vector<VirtualOutcome> run(const Trials& trials, const sim::Scene& first) {
   return outcomes;
 }
 
+Status keep_edges(const std::string& folder, std::uint64_t seed, const std::vector<VirtualOutcome>& outcomes) {
+  for (std::size_t i = 0; i < outcomes.size(); ++i) {
+    const VirtualOutcome& o = outcomes[i];
+    if (!o.solution) continue;
+    const std::string stem = folder + "/" + std::to_string(seed + i);
+    const json truth{{"x_mm", o.truth.x_mm}, {"y_mm", o.truth.y_mm}, {"theta_deg", deg(o.truth.theta_rad)}};
+    for (const auto& [ending, text] : {std::pair<std::string, std::string>{".edges.csv", files::edges_csv(o.solution->evidence.edges)},
+                                       {".path.csv", files::path_csv(o.solution->evidence.path)},
+                                       {".truth.json", truth.dump() + "\n"}}) {
+      if (const Status written = write_file_durably(stem + ending, text); !written.ok()) return written;
+    }
+  }
+  return Done{};
+}
+
 struct Spread {
   double std = 0, rms = 0, worst = 0;
 };
@@ -88,8 +104,9 @@ int command_trials(Arguments arguments) {
                    "  --job JOB.yaml   the job (default config/jobs/demo-NAME.yaml)\n"
                    "  --cell CELL      the cell (default config/cell-demo.yaml)\n"
                    "  --weld           also run the weld programs and measure the torch on the true seams\n"
-                   "  --each           a line a trial on stderr\n",
-                   {"workpiece", "count", "seed", "threads", "job", "cell"}, {"json", "weld", "each"});
+                   "  --each           a line a trial on stderr, and the log of those that failed\n"
+                   "  --edges DIR      write SEED.edges.csv, SEED.path.csv and SEED.truth.json of each trial there\n",
+                   {"workpiece", "count", "seed", "threads", "job", "cell", "edges"}, {"json", "weld", "each"});
   if (line.exit_code()) return *line.exit_code();
   if (!line.has("workpiece")) return line.refuse("trials wants --workpiece");
   const auto count = line.number("count", 150), seed = line.number("seed", 1), threads = line.number("threads", 2);
@@ -123,6 +140,9 @@ int command_trials(Arguments arguments) {
 
   const std::vector<VirtualOutcome> outcomes = run(trials, std::get<sim::Scene>(first));
 
+  if (line.has("edges")) {
+    if (const Status kept = keep_edges(line.value("edges"), trials.seed, outcomes); !kept.ok()) return line.refuse(kept.error().text());
+  }
   std::vector<double> x, y, theta, seams;
   int failures = 0;
   double scan_s = 0;
@@ -132,6 +152,9 @@ int command_trials(Arguments arguments) {
       std::fprintf(stderr, "%4zu %-7s dx %+.3f dy %+.3f mm dtheta %+.4f deg  %d points, %d passes, scan %.1f s  %s\n", i + trials.seed,
                    o.verdict.c_str(), o.centroid_error_mm.x(), o.centroid_error_mm.y(), deg(o.theta_error_rad), o.points, o.passes,
                    o.scan_s, o.accepted ? "" : o.reason.c_str());
+      if (!o.accepted) {
+        for (const std::string& event : o.log) std::fprintf(stderr, "       %s\n", event.c_str());
+      }
     }
     scan_s += o.scan_s / static_cast<double>(outcomes.size());
     if (!o.accepted) {

@@ -39,6 +39,7 @@ review::ReportInput JobStory::report(const job::Cell& cell, const cell::CellSetu
   input.job = cell.status().job;
   input.state = end_ ? (end_->accepted ? "done" : "failed") : job::to_string(cell.status().state);
   input.reason = end_ ? end_->reason : cell.status().fault_text;
+  if (cell.status().fault != job::FaultCode::None) input.cause = job::to_string(cell.status().fault);
   input.table_z_mm = setup.table.z_mm;
   if (cell.job()) input.workpiece = cell.job()->workpiece;
   if (const auto prepared = cell.prepared()) {

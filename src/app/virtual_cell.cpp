@@ -148,12 +148,18 @@ class VirtualCell {
     if (!outcome_.finished) outcome_.reason = "gave up in state " + std::string(job::to_string(cell_.status().state));
     if (const auto solution = cell_.solution()) {
       const Vec2& centroid = cell_.prepared()->outline.centroid;
+      outcome_.solution = solution;
       outcome_.cause = solution->found.cause;
       outcome_.found = solution->found.pose;
       outcome_.centroid_error_mm = solution->found.pose * centroid - scene_.truth * centroid;
       outcome_.theta_error_rad = wrap_pi(solution->found.pose.theta_rad - scene_.truth.theta_rad);
       outcome_.certificates = solution->certificates;
       outcome_.points = solution->found.points;
+    }
+    if (!outcome_.accepted) {
+      if (const auto events = rws_.event_log(5); events.ok()) {
+        for (const auto& e : *events) outcome_.log.push_back("controller's log: " + std::to_string(e.code) + " " + e.title + ": " + e.description);
+      }
     }
     outcome_.seam_error_mm = sim::seam_errors_mm(scene_, controller_.weld_traces());
     return outcome_;

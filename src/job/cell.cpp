@@ -117,9 +117,11 @@ void Cell::on(const EgmCycle& cycle) {
   const bool running = feedback.motors == wire::MotorState::On && feedback.mci == wire::MciState::Running &&
                        feedback.rapid != wire::RapidState::Stopped;
   if (status_.state == State::PreparingScan) {
-    // A few frames in a row, so that a session that dies at once does not count as open.
+    // Frames before the program was started anew belong to an earlier session; and a few in a row, so that a session
+    // that dies at once does not count as open.
     constexpr int kSettledFrames = 5;
-    running_frames_ = running ? running_frames_ + 1 : 0;
+    const bool opened = awaited_request_ == 0;
+    running_frames_ = running && opened ? running_frames_ + 1 : 0;
     if (running_frames_ >= kSettledFrames) fire(Event::EgmReady);
     return;
   }
@@ -139,7 +141,7 @@ void Cell::on(const EgmCycle& cycle) {
     status_.progress = plan->duration_s() > 0 ? report.plan_time_s / plan->duration_s() : 1;
   } else if (motion_started_) {
     fault(FaultCode::EgmLost, "the EGM session restarted or stopped in the middle of the scan");
-  } else if (report.refusal != robot::EgmRefusal::None) {
+  } else if (report.refusal != robot::EgmRefusal::None && seconds(now_ - state_since_) > timeouts_.offer_s) {
     fault(FaultCode::MotionRefused, std::string("the motion was not begun: ") + robot::to_string(report.refusal));
   } else if (seconds(now_ - state_since_) > 2.0) {
     fault(FaultCode::MotionRefused, "the motion did not begin within 2 s");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 namespace weldcell::job {
 
@@ -22,17 +23,6 @@ weld::CertifyOptions certify_options(const cell::CellSetup& cell) {
   return options;
 }
 
-/// Certificates as if the part lay exactly as planned: what reach and drawings are checked with.
-std::vector<weld::WeldCertificate> nominal_welds(const cell::CellSetup& cell, const JobInput& job,
-                                                 const workpiece::OutlineTemplate& outline, const Pose2& planned) {
-  localize::Localization perfect;
-  perfect.verdict = localize::Verdict::Weld;
-  perfect.cause = "ok";
-  perfect.pose = planned;
-  perfect.centroid_base = planned * outline.centroid;
-  return weld::certify(job.workpiece, perfect, certify_options(cell));
-}
-
 localize::LocalizeOptions localize_options(const cell::CellSetup& cell, const JobInput& job, const Pose2& planned) {
   const Acceptance& acceptance = job.order.acceptance;
   localize::LocalizeOptions options;
@@ -51,17 +41,29 @@ edges::EdgeOptions edge_options(const cell::CellSetup& cell, const JobInput& job
   options.height_mm = job.workpiece.height_mm;
   options.spot_mm = cell.laser.spot_mm;
   options.noise_mm = cell.laser.noise_mm;
-  options.triangulation_rad = cell.laser.triangulation_rad;
+  // The angle is stated at mid range; the step's foot lies on the table, farther off.
+  options.triangulation_rad =
+      std::atan(std::tan(cell.laser.triangulation_rad) * (cell.laser.start_of_range_mm + cell.laser.range_mm / 2) /
+                (cell.laser.standoff_mm + job.workpiece.height_mm));
   return options;
 }
 
-void add(edges::EdgeSummary& sum, const edges::EdgeSummary& more) {
-  sum.candidates += more.candidates;
-  sum.accepted += more.accepted;
-  sum.shadowed += more.shadowed;
-  sum.bad_height += more.bad_height;
-  sum.bad_fit += more.bad_fit;
-  sum.paper_slot_too_wide += more.paper_slot_too_wide;
+void add(Evidence& evidence, const edges::EdgeScan& scan) {
+  evidence.edges.insert(evidence.edges.end(), scan.edges.begin(), scan.edges.end());
+  evidence.path.insert(evidence.path.end(), scan.path.begin(), scan.path.end());
+  edges::EdgeSummary& sum = evidence.edge_summary;
+  sum.candidates += scan.summary.candidates;
+  sum.accepted += scan.summary.accepted;
+  sum.shadowed += scan.summary.shadowed;
+  sum.bad_height += scan.summary.bad_height;
+  sum.bad_fit += scan.summary.bad_fit;
+  sum.paper_slot_too_wide += scan.summary.paper_slot_too_wide;
+}
+
+std::vector<Segment> outline_at(const workpiece::OutlineTemplate& outline, const Pose2& pose) {
+  std::vector<Segment> edges;
+  for (const workpiece::VisibleEdge& edge : outline.edges) edges.push_back({pose * edge.line.a, pose * edge.line.b});
+  return edges;
 }
 
 void add_thinned(std::vector<align::SurfacePoint>& shown, const std::vector<align::SurfacePoint>& points) {
@@ -88,7 +90,7 @@ Result<Prepared> prepare(const cell::CellSetup& cell, const JobInput& job) {
     out.planned = *centred;
   }
 
-  out.nominal = nominal_welds(cell, job, out.outline, out.planned);
+  out.nominal = weld::assume_exact(job.workpiece, out.planned, certify_options(cell));
   auto torch = weld::plan_torch(cell, job.workpiece, out.nominal, cell.home);
   if (!torch.ok()) return torch.error();
 
@@ -134,17 +136,20 @@ Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared&
                const Evidence& before) {
   Solution out;
   out.evidence = before;
-  {
-    const std::vector<align::SurfacePoint> points =
-        align::align(cell, scan.readings, scan.feedback, out.evidence.align);
-    const edges::EdgeScan found = edges::detect(points, edge_options(cell, job));
-    out.evidence.edges.insert(out.evidence.edges.end(), found.edges.begin(), found.edges.end());
-    out.evidence.path.insert(out.evidence.path.end(), found.path.begin(), found.path.end());
-    add(out.evidence.edge_summary, found.summary);
-    add_thinned(out.evidence.shown, points);
-  }
-  out.found = localize::localize(prepared.outline, out.evidence.edges, out.evidence.path,
-                                 localize_options(cell, job, prepared.planned));
+  const std::vector<align::SurfacePoint> points = align::align(cell, scan.readings, scan.feedback, out.evidence.align);
+  add_thinned(out.evidence.shown, points);
+  const localize::LocalizeOptions options = localize_options(cell, job, prepared.planned);
+
+  // Where the receiver sees a step's foot depends on the edge's direction: a first pose tells it, the second look uses it.
+  edges::EdgeOptions look = edge_options(cell, job);
+  const edges::EdgeScan first = edges::detect(points, look);
+  Evidence draft = out.evidence;
+  add(draft, first);
+  out.found = localize::localize(prepared.outline, draft.edges, draft.path, options);
+  look.outline = outline_at(prepared.outline, out.found.pose);
+  add(out.evidence, edges::detect(points, look));
+  out.found = localize::localize(prepared.outline, out.evidence.edges, out.evidence.path, options);
+
   out.certificates = weld::certify(job.workpiece, out.found, certify_options(cell));
   out.verdict = weld::decide(out.found, out.certificates);
   if (out.verdict.verdict != localize::Verdict::Weld) return out;
@@ -155,7 +160,9 @@ Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared&
     return out;
   }
   out.torch = std::move(*torch);
-  out.rapid = weld::rapid_module(cell, job.order.name, out.torch);
+  weld::RapidOptions rapid;
+  rapid.program_version = WELDCELL_VERSION;
+  out.rapid = weld::rapid_module(cell, job.order.name, out.torch, rapid);
   return out;
 }
 

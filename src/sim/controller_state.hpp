@@ -34,6 +34,8 @@ struct ControllerState final : rapid::Machine {
   void set_panel(PanelState next);
   bool start_program(bool forever);
   void stop_program(const std::string& why);
+  /// RAPID runs, or the arm still ramps to rest after it: what Robot Web Services call running.
+  bool executing() const { return task.running() || drive == Drive::Ramp; }
   void log(int type, int code, const std::string& title, const std::string& text = "");
   bool motors_on() const { return panel == PanelState::MotorsOn; }
   std::int64_t device_us(HostTime t) const;

@@ -233,7 +233,7 @@ HttpReply RwsHandler::execution() {
   if (method_ == "GET") {
     return answer({{"rap-execution",
                     "execution",
-                    {{"ctrlexecstate", s_.task.running() ? "running" : "stopped"},
+                    {{"ctrlexecstate", s_.executing() ? "running" : "stopped"},
                      {"cycle", s_.task.forever() ? "forever" : "once"}}}});
   }
   if (action_is("start")) return start();
@@ -242,7 +242,7 @@ HttpReply RwsHandler::execution() {
     return no_content();
   }
   if (action_is("resetpp")) {
-    if (s_.task.running()) return fault(403, kRwsHeldByOther, "Program is executing");
+    if (s_.executing()) return fault(403, kRwsHeldByOther, "Program is executing");
     if (!s_.task.set_pointer("", "main")) return fault(400, kRwsWrongState, "No routine main");
     s_.path.reset(s_.reference);
     s_.egm_interrupted = false;
@@ -273,7 +273,7 @@ HttpReply RwsHandler::start() {
   if (!s_.truth.auto_mode) return fault(403, kRwsRejected, "Remote start needs AUTO");
   if (!s_.motors_on())
     return fault(400, kRwsWrongState, "Execution start refused: motors are off [org -508]");
-  if (s_.task.running())
+  if (s_.executing())
     return fault(400, kRwsWrongState, "Execution start refused: already running [org -508]");
   if (!s_.task.has_pointer())
     return fault(400, kRwsWrongState, "Execution start refused: program pointer not set [org -508]");
@@ -339,7 +339,7 @@ HttpReply RwsHandler::task_action(const std::string& action) {
   }
   if (action == "set-pp-routine") {
     if (!holds("rapid")) return fault(403, kRwsNoMastership, "Mastership of rapid is needed");
-    if (s_.task.running()) return fault(403, kRwsHeldByOther, "Program is executing");
+    if (s_.executing()) return fault(403, kRwsHeldByOther, "Program is executing");
     if (!s_.task.set_pointer(rapid::lower(form("module")), rapid::lower(form("routine")))) {
       return fault(400, kRwsUnknownModule,
                    "Routine " + form("module") + "/" + form("routine") + " not found");

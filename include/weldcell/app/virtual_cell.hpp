@@ -2,6 +2,7 @@
 // byte, without sockets or sleeping. Deterministic for a seed. Single-threaded.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,9 +31,9 @@ struct VirtualOutcome {
   std::vector<weld::WeldCertificate> certificates;
   std::vector<double> seam_error_mm;      ///< torch's worst lateral error on the true seam, one a welded seam
   double scan_s = 0;                      ///< virtual time of all passes
-  double solve_s = 0;                     ///< host time is not known here: 0 unless the caller measures
   double virtual_s = 0;
   int passes = 0, points = 0;
+  std::shared_ptr<const job::Solution> solution;  ///< of the last localization; null when there was none
   std::vector<std::string> log;
 };
 

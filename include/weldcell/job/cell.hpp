@@ -174,6 +174,7 @@ struct CellTimeouts {
   double egm_open_s = 30;
   double query_s = 0.4;
   double laser_gap_s = 0.25;
+  double offer_s = 0.25;      ///< a refusal seen earlier than this after the offer belongs to the plan before
   double settle_s = 0.1;      ///< rest after a scan, so that the last readings arrive
 };
 
