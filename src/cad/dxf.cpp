@@ -193,7 +193,7 @@ Status drop_openings(std::vector<Loop>& loops, const Drawing& drawing, std::vect
     const std::string& name = drawing.groups[static_cast<std::size_t>(outer[holder].group)];
     if (seen.second > 0.3 * signed_area(outer[holder].outline)) {
       return fault("cad.outline",
-                   fmt::format("an outline on '{}' holds {} others that fill most of it: a whole frame, a "
+                   fmt::format("an outline on '{}' holds {} more that fill most of it: a whole frame, a "
                                "sheet border or nested "
                                "outlines",
                                name, seen.first),

@@ -99,7 +99,7 @@ int run(const std::string& path, const cad::Options& options) {
   auto part = read_any(path, options);
   if (!part.ok()) return refuse(path + ": " + part.error().text());
   auto workpiece = cad::make_workpiece(*part, std::filesystem::path(path).stem().string());
-  if (!workpiece.ok()) return refuse(path + ": " + workpiece.error().what + ": " + workpiece.error().mend);
+  if (!workpiece.ok()) return refuse(path + ": " + workpiece.error().text());
   for (const std::string& note : part->notes) std::printf("# %s\n", note.c_str());
   const std::string yaml = files::workpiece_yaml(*workpiece);
   std::fwrite(yaml.data(), 1, yaml.size(), stdout);

@@ -165,8 +165,8 @@ std::optional<Polygon> outer_boundary(const std::vector<Segment>& segments, doub
   }
   if (at != start || out.size() < 3 || signed_area(out) <= 0) return std::nullopt;
   const Box2 box = bounds(out);
-  for (std::size_t id = 0; id < pool.size(); ++id) {
-    const Vec2& p = pool.point(static_cast<int>(id));
+  for (const auto& [id, neighbours] : graph) {
+    const Vec2& p = pool.point(id);
     const bool outside =
         (p.array() < box.min.array() - 0.05).any() || (p.array() > box.max.array() + 0.05).any();
     if (outside) return std::nullopt;

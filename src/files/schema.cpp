@@ -52,12 +52,13 @@ bool looks_infinite(std::string word) {
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
   std::string best;
-  std::size_t best_distance = std::max<std::size_t>(1, word.size() / 3) + 1;
+  std::size_t best_distance = (word.size() + 2) / 3 + 1;
   for (const std::string& candidate : known) {
     // A unit left out or the wrong one ("speed", "speed_m_s") is the commonest slip with names that carry
     // units.
-    const bool stem =
-        word.size() >= 3 && (candidate.rfind(word + "_", 0) == 0 || word.rfind(candidate + "_", 0) == 0);
+    const bool stem = (word.size() >= 3 && candidate.rfind(word + "_", 0) == 0) ||
+                      word.rfind(candidate + "_", 0) == 0 ||
+                      (word.size() >= 4 && candidate.rfind(word, 0) == 0);
     const std::size_t distance = stem ? 1 : edit_distance(word, candidate);
     if (distance < best_distance) {
       best_distance = distance;
