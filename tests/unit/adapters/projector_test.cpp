@@ -11,6 +11,15 @@
 #include "weldcell/adapters/projector_png.hpp"
 #include "weldcell/adapters/projector_window.hpp"
 
+// Read by the sanitizers where they are linked. The font libraries keep what they loaded until the process
+// ends, and they hand it between their own threads by means that the thread sanitizer does not see.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libfontconfig\nleak:libdbus-1\n"; }
+extern "C" const char* __tsan_default_suppressions();
+extern "C" const char* __tsan_default_suppressions() {
+  return "race:libpangoft2\nrace:libpango\nrace:libfontconfig\nrace:libglib\nrace:FcValueSave\n";
+}
+
 namespace weldcell::adapters {
 namespace {
 
