@@ -17,7 +17,12 @@ namespace {
 constexpr double kAmbiguous_nats = 7;
 /// Another reading of the same points must be this much better to be named as the cause.
 constexpr double kClearly_nats = 15;
-constexpr double kDisplaced_nats = 14;
+/// Per point, on average: about two thirds of the points lie on the part.
+constexpr double kExplains_nats = 2.7;
+constexpr double kNothing_nats = -1e300;
+constexpr double kDisplaced_nats = 6.5;
+/// A single point on a hidden side counts when clutter would put one there in fewer scans than this.
+constexpr double kChance = 0.005;
 constexpr double kMinInlierShare = 0.35;
 constexpr double kMinRate = 0.5;
 /// What a pose must be known to (two sigmas) when no weld says so more exactly.
@@ -45,12 +50,13 @@ bool suspicious(const Situation& s, const Localization& result) {
                      [](const MemberEvidence& m) { return m.expected >= 3 && m.seen < 0.6 * m.expected; });
 }
 
-/// The best fit of other crossings or another box, when it is clearly better than the found one.
-bool clearly_better(const Situation& s, const std::vector<Crossing>& crossings, const SearchBox& box,
-                    FitState* found) {
-  double best = -1e300;
+/// The best fit of these crossings anywhere in the box: its log-likelihood, or nothing when it explains them
+/// badly.
+double best_elsewhere(const Situation& s, const std::vector<Crossing>& crossings, const SearchBox& box,
+                      FitState* found) {
   const std::vector<Crossing> sample = sampled(crossings, 400);
   const std::vector<Crossing> few = sampled(crossings, kSearchPoints);
+  double best = kNothing_nats;
   for (const Mode& mode : search(s.fields, crossings, box, 8)) {
     const FitState state = polish(s.fields, few, mode.pose, 12, nullptr);
     const double likelihood = rough_log_likelihood(s.fields, sample, state);
@@ -58,7 +64,7 @@ bool clearly_better(const Situation& s, const std::vector<Crossing>& crossings, 
     best = likelihood;
     *found = state;
   }
-  return best > rough_log_likelihood(s.fields, sampled(s.crossings, 400), s.fit.state) + kClearly_nats;
+  return best > -kExplains_nats * static_cast<double>(sample.size()) ? best : kNothing_nats;
 }
 
 std::vector<Crossing> mirrored(const std::vector<Crossing>& crossings, const Vec2& about) {
@@ -72,36 +78,49 @@ std::vector<Crossing> mirrored(const std::vector<Crossing>& crossings, const Vec
   return out;
 }
 
-bool is_mirrored(const Situation& s) {
-  SearchBox box{{s.options.planned * s.outline.centroid, 0}, s.options.range_mm, kPi};
-  FitState state;
-  return clearly_better(s, mirrored(s.crossings, box.planned.centre), box, &state);
-}
-
-bool lies_outside(const Situation& s, Localization& result) {
-  SearchBox box{{s.options.planned * s.outline.centroid, s.options.planned.theta_rad},
-                std::min(2.5 * s.options.range_mm + 50, 600.0),
-                kPi};
-  FitState state;
-  if (!clearly_better(s, s.crossings, box, &state)) return false;
-  const Vec2 off = state.pose.centre - box.planned.centre;
+/// Whether the mirror image of the part, or the part outside the allowed range, explains the points clearly
+/// better.
+bool explained_elsewhere(const Situation& s, Localization& result) {
+  const Vec2 planned = s.options.planned * s.outline.centroid;
+  const double reach = std::min(1.5 * s.options.range_mm + 50, 400.0);
+  const double here = rough_log_likelihood(s.fields, sampled(s.crossings, 400), s.fit.state) + kClearly_nats;
+  // The mirror line runs through the planned origin, so a part drawn about its origin keeps its place.
+  const SearchBox anywhere{{planned, s.options.planned.theta_rad}, reach, kPi, Vec2(-s.outline.centroid)};
+  FitState outside, mirror;
+  const double of_outside = best_elsewhere(s, s.crossings, anywhere, &outside);
+  const double of_mirror =
+      best_elsewhere(s, mirrored(s.crossings, s.options.planned.translation()), anywhere, &mirror);
+  if (std::max(of_outside, of_mirror) <= here) return false;
+  const double turn = wrap_pi(outside.pose.theta_rad - s.options.planned.theta_rad);
+  // A part that only lies too far off is not called mirrored, even where its drawing is nearly its own mirror
+  // image.
+  const bool shifted_only = of_outside > here && std::abs(turn) <= s.options.range_rad + rad(2);
+  if (of_mirror > of_outside + (shifted_only ? kAmbiguous_nats : -kAmbiguous_nats)) {
+    const bool either = of_outside > of_mirror - kAmbiguous_nats;
+    say(result, Verdict::Reject, "mirrored",
+        fmt::format("The part is the mirror image of drawing {}{}. Turn it over or load the mirrored job.",
+                    s.outline.name, either ? " (or lies turned by " + degrees(turn) + ")" : ""));
+    return true;
+  }
   say(result, Verdict::Reject, "out_of_range",
       fmt::format(
           "The part lies {} and {} away from its planned place, outside the allowed range. Move it to the "
           "projected outline and scan again.",
-          millimetres(off.norm()), degrees(wrap_pi(state.pose.theta_rad - box.planned.theta_rad))));
+          millimetres((outside.pose.centre - planned).norm()), degrees(turn)));
   return true;
 }
 
+/// A member that the points find at another place, or whose joint stands open.
 bool member_displaced(const Situation& s, Localization& result, const std::vector<int>& unseen) {
   Displacement best;
   best.gain = kDisplaced_nats;
-  const int members = static_cast<int>(s.evidence.members.size());
-  for (int m = 0; m < members; ++m) {
-    const bool hardly_seen = std::find(unseen.begin(), unseen.end(), m) != unseen.end();
+  for (int m = 0; m < static_cast<int>(s.evidence.members.size()); ++m) {
     const MemberEvidence& e = s.evidence.members[static_cast<std::size_t>(m)];
-    if (!hardly_seen && e.seen == e.expected) continue;
-    const Displacement d = find_displacement(s.fields, s.path, s.crossings, s.fit, s.evidence, m);
+    const bool hardly_seen = std::find(unseen.begin(), unseen.end(), m) != unseen.end();
+    if (!hardly_seen && e.seen == e.expected && e.exposed == 0) continue;
+    const Displacement d =
+        find_displacement(s.outline, s.fields, s.path, s.crossings, s.fit, s.evidence, m, hardly_seen);
+    if (hardly_seen && d.explained < std::max(4.0, 0.4 * e.expected)) continue;
     if (d.gain > best.gain) best = d;
   }
   if (best.member < 0) return false;
@@ -110,6 +129,26 @@ bool member_displaced(const Situation& s, Localization& result, const std::vecto
           "{} lies {} of its place on the drawing: another revision, or set up wrong. Check the part against "
           "drawing {}.",
           member_name(s, best.member), direction_on_drawing(best.shift), s.outline.name));
+  return true;
+}
+
+/// Points on sides that a joint should hide: something there is not as drawn.
+bool joint_open(const Situation& s, Localization& result) {
+  if (s.evidence.exposed < 2 && (s.evidence.exposed == 0 || s.evidence.exposed_by_chance > kChance))
+    return false;
+  int worst = 0;
+  for (int m = 1; m < static_cast<int>(s.evidence.members.size()); ++m) {
+    if (s.evidence.members[static_cast<std::size_t>(m)].exposed >
+        s.evidence.members[static_cast<std::size_t>(worst)].exposed) {
+      worst = m;
+    }
+  }
+  if (s.evidence.exposed_by_chance > 0.1 * s.evidence.exposed) return false;
+  say(result, Verdict::Reject, "wrong_revision",
+      fmt::format("The joint of {} stands open: it is shorter than drawn, or not in its place. Check the "
+                  "part against "
+                  "drawing {}.",
+                  member_name(s, worst), s.outline.name));
   return true;
 }
 
@@ -133,23 +172,17 @@ bool member_off(const Situation& s, Localization& result) {
 
 bool wrong_part(const Situation& s, Localization& result) {
   const std::vector<int> unseen = unseen_members(s.evidence);
-  const bool doubtful = suspicious(s, result);
-  if (doubtful && is_mirrored(s)) {
-    say(result, Verdict::Reject, "mirrored",
-        fmt::format("The part is the mirror image of drawing {}. Turn it over or load the mirrored job.",
-                    s.outline.name));
-    return true;
-  }
-  if (doubtful && lies_outside(s, result)) return true;
+  if (suspicious(s, result) && explained_elsewhere(s, result)) return true;
   if (s.evidence.has_path && member_displaced(s, result, unseen)) return true;
   if (!unseen.empty()) {
-    say(result, Verdict::Rescan, "member_missing",
+    const bool gone = s.evidence.members[static_cast<std::size_t>(unseen.front())].exposed > 0;
+    say(result, gone ? Verdict::Reject : Verdict::Rescan, "member_missing",
         fmt::format(
             "{} was not seen although the scan passed over its place. Put it in place and scan again.",
             member_name(s, unseen.front())));
     return true;
   }
-  return member_off(s, result);
+  return joint_open(s, result) || member_off(s, result);
 }
 
 /// The edge whose crossing would tell most about the worst known direction.
@@ -199,7 +232,13 @@ bool ambiguous(const Situation& s, Localization& result) {
 }
 
 bool out_of_range(const Situation& s, Localization& result) {
-  const Offset off = offset_from_planned(s.outline, s.options.planned, result.pose);
+  Offset off = offset_from_planned(s.outline, s.options.planned, result.pose);
+  // A part whose centroid or whose origin keeps the limits keeps them.
+  const double dx = result.pose.x_mm - s.options.planned.x_mm, dy = result.pose.y_mm - s.options.planned.y_mm;
+  if (std::max(std::abs(dx), std::abs(dy)) < std::max(std::abs(off.dx_mm), std::abs(off.dy_mm))) {
+    off.dx_mm = dx;
+    off.dy_mm = dy;
+  }
   const auto beyond = [](double value, double limit, double slack) {
     return std::abs(value) > 1.02 * limit + slack;
   };

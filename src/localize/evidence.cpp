@@ -11,8 +11,9 @@ constexpr double kMinAcross = 0.35;  ///< |travel . normal| below which a crossi
 constexpr double kEndMargin_mm = 5;
 constexpr double kSameCrossing_mm = 9;
 constexpr double kExplained_mm = 1.5;
-/// Nats for a point explained and for an expected crossing not seen.
-constexpr double kPointNats = 5, kUnseenNats = 3;
+constexpr double kSeenAside_mm = 2;
+/// Members a little off shift the ends of what a joint hides.
+constexpr double kInsideJoint_mm = 4;
 
 struct Piece {
   Vec2 from, to;
@@ -63,7 +64,9 @@ Evidence gather_evidence(const TemplateFields& fields, std::span<const PathPiece
   if (!out.has_path) return out;
   std::vector<std::vector<double>> seen_at(fields.edges().size());
   for (std::size_t i = 0; i < fit.matches.size(); ++i) {
-    if (fit.inlier[i] < 0.3) continue;
+    // A crossing that noise threw some sigmas off was seen all the same.
+    if (fit.matches[i].edge < 0 || (fit.inlier[i] < 0.3 && std::abs(fit.residuals[i]) > kSeenAside_mm))
+      continue;
     const FieldEdge& edge = fields.edges()[static_cast<std::size_t>(fit.matches[i].edge)];
     seen_at[static_cast<std::size_t>(fit.matches[i].edge)].push_back(
         (fit.matches[i].place - edge.a).dot(edge.direction));
@@ -116,26 +119,145 @@ std::vector<int> unseen_members(const Evidence& evidence) {
 
 namespace {
 
+/// The member that hides a point of a side, well inside the joint; -1 when none does.
+int hidden_by(const workpiece::OutlineTemplate& outline, int owner, const Vec2& p, const Vec2& direction,
+              const Vec2& outward) {
+  for (std::size_t m = 0; m < outline.members.size(); ++m) {
+    if (static_cast<int>(m) == owner) continue;
+    const auto covers = [&](double along) {
+      const Vec2 q = p + along * direction;
+      return contains(outline.members[m], q + kExplained_mm * outward) || contains(outline.members[m], q);
+    };
+    if (covers(0) && covers(kInsideJoint_mm) && covers(-kInsideJoint_mm)) return static_cast<int>(m);
+  }
+  return -1;
+}
+
+double hidden_length(const workpiece::OutlineTemplate& outline) {
+  double all = 0, visible = 0;
+  for (const Polygon& m : outline.members) {
+    for (std::size_t i = 0; i < m.size(); ++i) all += (m[(i + 1) % m.size()] - m[i]).norm();
+  }
+  for (const workpiece::VisibleEdge& e : outline.edges) visible += e.line.length();
+  return std::max(0.0, all - visible);
+}
+
+/// Area that the points span, for the density of clutter; mm2.
+double spanned_area(const std::vector<Crossing>& crossings) {
+  Vec2 low = Vec2::Constant(1e300), high = Vec2::Constant(-1e300);
+  for (const Crossing& c : crossings) {
+    low = low.cwiseMin(c.point);
+    high = high.cwiseMax(c.point);
+  }
+  return std::max(1e4, (high - low).prod());
+}
+
+int clutter_count(const Fit& fit) {
+  return static_cast<int>(
+      std::count_if(fit.inlier.begin(), fit.inlier.end(), [](double p) { return p < 0.5; }));
+}
+
+}  // namespace
+
+void add_exposed(const workpiece::OutlineTemplate& outline, const std::vector<Crossing>& crossings,
+                 const Fit& fit, Evidence& evidence) {
+  evidence.hides.assign(crossings.size(), -1);
+  const double c = std::cos(fit.state.pose.theta_rad), s = std::sin(fit.state.pose.theta_rad);
+  for (std::size_t i = 0; i < crossings.size(); ++i) {
+    if (fit.inlier[i] > 0.3) continue;
+    const Vec2 p = fit.matches[i].place + outline.centroid;
+    const Vec2& in = crossings[i].inward;
+    const Vec2 inward(c * in.x() + s * in.y(), -s * in.x() + c * in.y());
+    for (std::size_t m = 0; m < outline.members.size() && evidence.hides[i] < 0; ++m) {
+      const Polygon& polygon = outline.members[m];
+      for (std::size_t k = 0; k < polygon.size(); ++k) {
+        const Segment side{polygon[k], polygon[(k + 1) % polygon.size()]};
+        const Vec2 d = side.direction(), outward(d.y(), -d.x());
+        if (distance(p, side) > kExplained_mm || inward.dot(outward) > -0.5) continue;
+        const int by = hidden_by(outline, static_cast<int>(m), p, d, outward);
+        if (by >= 0) evidence.hides[i] = by;
+      }
+    }
+    if (evidence.hides[i] < 0) continue;
+    ++evidence.members[static_cast<std::size_t>(evidence.hides[i])].exposed;
+    ++evidence.exposed;
+  }
+  // A third of the clutter travels steeply enough across the side, and with the right sign.
+  evidence.exposed_by_chance =
+      clutter_count(fit) / 3.0 * hidden_length(outline) * 2 * kExplained_mm / spanned_area(crossings);
+}
+
+namespace {
+
 /// How well one member, shifted, explains the points that no other member claims and the path over it.
 class MemberView {
  public:
-  MemberView(const TemplateFields& fields, std::span<const PathPiece> path,
-             const std::vector<Crossing>& crossings, const Fit& fit, int member)
-      : fit_(fit) {
+  MemberView(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
+             std::span<const PathPiece> path, const std::vector<Crossing>& crossings, const Fit& fit,
+             const Evidence& evidence, int member) {
+    const Polygon& polygon = outline.members[static_cast<std::size_t>(member)];
     Vec2 low = Vec2::Constant(1e300), high = Vec2::Constant(-1e300);
+    double length = 0;
+    for (std::size_t k = 0; k < polygon.size(); ++k) {
+      const Vec2 a = polygon[k] - outline.centroid, b = polygon[(k + 1) % polygon.size()] - outline.centroid;
+      const Vec2 d = (b - a).normalized();
+      sides_.push_back({a, d, Vec2(d.y(), -d.x()), (b - a).norm(), member, false});
+      low = low.cwiseMin(a);
+      high = high.cwiseMax(a);
+      length += (b - a).norm();
+    }
     for (const FieldEdge& edge : fields.edges()) {
-      if (edge.member != member) continue;
-      edges_.push_back(edge);
-      const Vec2 end = edge.a + edge.length_mm * edge.direction;
-      low = low.cwiseMin(edge.a).cwiseMin(end);
-      high = high.cwiseMax(edge.a).cwiseMax(end);
+      if (edge.member == member) edges_.push_back(edge);
     }
     const Vec2 margin = Vec2::Constant(kDisplacement_mm + 5);
     low -= margin;
     high += margin;
+    take_points(fields, crossings, fit, evidence, member, low, high);
+    for (const Piece& piece : in_part(path, fit.state.pose)) {
+      const Vec2 a = piece.from.cwiseMin(piece.to), b = piece.from.cwiseMax(piece.to);
+      if ((b.array() < low.array()).any() || (a.array() > high.array()).any()) continue;
+      pieces_.push_back(piece);
+    }
+    const double chance =
+        0.5 * (clutter_count(fit) + 1) * length * 2 * kExplained_mm / spanned_area(crossings);
+    point_nats_ = std::clamp(-std::log(chance), 2.0, 6.0);
+    const MemberEvidence& own = evidence.members[static_cast<std::size_t>(member)];
+    const int expected = evidence.expected - own.expected, missed = expected - (evidence.seen - own.seen);
+    unseen_nats_ = std::clamp(-std::log((missed + 0.5) / (expected + 1.0)), 0.3, 5.0);
+  }
+
+  const std::vector<FieldEdge>& sides() const { return sides_; }
+
+  int explained(const Vec2& shift) const {
+    return static_cast<int>(std::count_if(points_.begin(), points_.end(),
+                                          [&](const Point& p) { return fits(p, sides_, shift); }));
+  }
+
+  /// Nats at the drawn place: its points less its visible crossings that were not seen.
+  double drawn() const {
+    const auto here = std::count_if(points_.begin(), points_.end(),
+                                    [&](const Point& p) { return fits(p, edges_, Vec2::Zero()); });
+    return point_nats_ * static_cast<double>(here) - unseen_nats_ * unseen(Vec2::Zero());
+  }
+  /// The same at another place; joints that open there explain the points they expose.
+  double shifted(const Vec2& shift) const {
+    return point_nats_ * (explained(shift) + exposed_) - unseen_nats_ * unseen(shift);
+  }
+
+ private:
+  struct Point {
+    Vec2 place, inward;
+  };
+
+  void take_points(const TemplateFields& fields, const std::vector<Crossing>& crossings, const Fit& fit,
+                   const Evidence& evidence, int member, const Vec2& low, const Vec2& high) {
     const double c = std::cos(fit.state.pose.theta_rad), s = std::sin(fit.state.pose.theta_rad);
     for (std::size_t i = 0; i < crossings.size(); ++i) {
       const Match& m = fit.matches[i];
+      if (evidence.hides[i] >= 0) {
+        exposed_ += evidence.hides[i] == member;
+        continue;
+      }
       const bool claimed =
           fit.inlier[i] > 0.3 && fields.edges()[static_cast<std::size_t>(m.edge)].member != member;
       if (claimed || (m.place.array() < low.array()).any() || (m.place.array() > high.array()).any())
@@ -143,22 +265,21 @@ class MemberView {
       const Vec2& inward = crossings[i].inward;
       points_.push_back({m.place, Vec2(c * inward.x() + s * inward.y(), -s * inward.x() + c * inward.y())});
     }
-    for (const Piece& piece : in_part(path, fit.state.pose)) {
-      const Vec2 a = piece.from.cwiseMin(piece.to), b = piece.from.cwiseMax(piece.to);
-      if ((b.array() < low.array()).any() || (a.array() > high.array()).any()) continue;
-      pieces_.push_back(piece);
-    }
   }
 
-  int explained(const Vec2& shift) const {
+  static bool fits_edge(const Point& p, const FieldEdge& edge, const Vec2& shift) {
+    const Vec2 from = p.place - edge.a - shift;
+    const double along = from.dot(edge.direction);
+    return std::abs(from.dot(edge.outward)) <= kExplained_mm && along >= -kExplained_mm &&
+           along <= edge.length_mm + kExplained_mm && p.inward.dot(edge.outward) <= 0;
+  }
+  static bool fits(const Point& p, const std::vector<FieldEdge>& edges, const Vec2& shift) {
+    return std::any_of(edges.begin(), edges.end(),
+                       [&](const FieldEdge& e) { return fits_edge(p, e, shift); });
+  }
+
+  int unseen(const Vec2& shift) const {
     int count = 0;
-    for (const Point& p : points_) count += fits(p, shift);
-    return count;
-  }
-
-  /// Nats: points explained less crossings that should be there and are not.
-  double score(const Vec2& shift) const {
-    int unseen = 0;
     for (const FieldEdge& edge : edges_) {
       std::vector<double> seen_at;
       for (const Point& p : points_) {
@@ -167,63 +288,62 @@ class MemberView {
       for (const Piece& piece : pieces_) {
         const double along = crossing_along(piece, edge, shift);
         if (along < 0) continue;
-        unseen += std::none_of(seen_at.begin(), seen_at.end(),
-                               [&](double at) { return std::abs(at - along) <= kSameCrossing_mm; });
+        count += std::none_of(seen_at.begin(), seen_at.end(),
+                              [&](double at) { return std::abs(at - along) <= kSameCrossing_mm; });
       }
     }
-    return kPointNats * explained(shift) - kUnseenNats * unseen;
+    return count;
   }
 
- private:
-  struct Point {
-    Vec2 place, inward;
-  };
-  static bool fits_edge(const Point& p, const FieldEdge& edge, const Vec2& shift) {
-    const Vec2 from = p.place - edge.a - shift;
-    const double along = from.dot(edge.direction);
-    return std::abs(from.dot(edge.outward)) <= kExplained_mm && along >= -kExplained_mm &&
-           along <= edge.length_mm + kExplained_mm && p.inward.dot(edge.outward) <= 0;
-  }
-  bool fits(const Point& p, const Vec2& shift) const {
-    return std::any_of(edges_.begin(), edges_.end(),
-                       [&](const FieldEdge& e) { return fits_edge(p, e, shift); });
-  }
-
-  const Fit& fit_;
-  std::vector<FieldEdge> edges_;
+  std::vector<FieldEdge> sides_, edges_;
   std::vector<Point> points_;
   std::vector<Piece> pieces_;
+  int exposed_ = 0;
+  double point_nats_ = 5, unseen_nats_ = 3;
 };
+
+std::vector<Vec2> trial_shifts(const MemberView& view, bool anywhere) {
+  std::vector<Vec2> out;
+  constexpr int kSteps = static_cast<int>(kDisplacement_mm);
+  std::vector<Vec2> axes;
+  for (const FieldEdge& side : view.sides()) {
+    const auto known = [&](const Vec2& a) { return std::abs(a.dot(side.outward)) > 0.99; };
+    if (std::none_of(axes.begin(), axes.end(), known)) axes.push_back(side.outward);
+  }
+  for (const Vec2& axis : axes) {
+    for (int i = -kSteps; i <= kSteps; ++i) {
+      if (std::abs(i) >= 4) out.push_back(i * axis);
+    }
+  }
+  if (!anywhere) return out;
+  for (int x = -kSteps; x <= kSteps; x += 2) {
+    for (int y = -kSteps; y <= kSteps; y += 2) out.push_back(Vec2(x, y));
+  }
+  return out;
+}
 
 }  // namespace
 
-Displacement find_displacement(const TemplateFields& fields, std::span<const PathPiece> path,
-                               const std::vector<Crossing>& crossings, const Fit& fit, const Evidence&,
-                               int member) {
-  const MemberView view(fields, path, crossings, fit, member);
+Displacement find_displacement(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
+                               std::span<const PathPiece> path, const std::vector<Crossing>& crossings,
+                               const Fit& fit, const Evidence& evidence, int member, bool anywhere) {
+  const MemberView view(outline, fields, path, crossings, fit, evidence, member);
   struct Candidate {
     Vec2 shift;
     int explained;
   };
   std::vector<Candidate> candidates;
-  constexpr int kSteps = static_cast<int>(kDisplacement_mm / 2);
-  for (int ix = -kSteps; ix <= kSteps; ++ix) {
-    for (int iy = -kSteps; iy <= kSteps; ++iy) {
-      const Vec2 shift(2.0 * ix, 2.0 * iy);
-      if (shift.norm() < 4) continue;
-      candidates.push_back({shift, view.explained(shift)});
-    }
+  for (const Vec2& shift : trial_shifts(view, anywhere)) {
+    if (shift.norm() >= 4) candidates.push_back({shift, view.explained(shift)});
   }
-  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    if (a.explained != b.explained) return a.explained > b.explained;
-    return a.shift.squaredNorm() < b.shift.squaredNorm();
-  });
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.explained > b.explained; });
   Displacement best;
   best.member = member;
   best.gain = -1e300;
-  const double here = view.score(Vec2::Zero());
+  const double here = view.drawn();
   for (std::size_t i = 0; i < std::min<std::size_t>(candidates.size(), 40); ++i) {
-    const double gain = view.score(candidates[i].shift) - here;
+    const double gain = view.shifted(candidates[i].shift) - here;
     if (gain > best.gain) best = {member, candidates[i].shift, candidates[i].explained, gain};
   }
   return best;

@@ -18,6 +18,7 @@ struct Expected {
 
 struct MemberEvidence {
   int expected = 0, seen = 0;
+  int exposed = 0;  ///< points on sides that a joint with this member should hide
 };
 
 struct Evidence {
@@ -27,11 +28,17 @@ struct Evidence {
   int expected = 0, seen = 0;
   /// Share of expected crossings seen, members without any left out; 1 without a path.
   double rate = 1;
+  int exposed = 0;
+  double exposed_by_chance = 0;  ///< points that clutter alone would put on hidden sides
+  std::vector<int> hides;        ///< one per crossing: the member whose joint should hide it; -1 = none
 };
 
 /// Pieces of the path against the template's edges at the found pose. Grazing crossings and those near an
 /// edge's end are left out: nobody can promise them.
 Evidence gather_evidence(const TemplateFields& fields, std::span<const PathPiece> path, const Fit& fit);
+/// Adds the points on sides hidden in joints.
+void add_exposed(const workpiece::OutlineTemplate& outline, const std::vector<Crossing>& crossings,
+                 const Fit& fit, Evidence& evidence);
 
 /// Members that the scan crossed often enough and hardly saw (chance below 1e-4 at the rate of the other
 /// members).
@@ -44,10 +51,10 @@ struct Displacement {
   int explained = 0;          ///< points
   double gain = 0;            ///< nats over the member at its drawn place
 };
-/// The best displacement of one member up to kDisplacement_mm.
-Displacement find_displacement(const TemplateFields& fields, std::span<const PathPiece> path,
-                               const std::vector<Crossing>& crossings, const Fit& fit,
-                               const Evidence& evidence, int member);
+/// The best displacement of one member up to kDisplacement_mm: along and across its sides, or anywhere.
+Displacement find_displacement(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
+                               std::span<const PathPiece> path, const std::vector<Crossing>& crossings,
+                               const Fit& fit, const Evidence& evidence, int member, bool anywhere);
 
 inline constexpr double kDisplacement_mm = 60;
 

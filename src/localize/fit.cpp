@@ -21,6 +21,7 @@ constexpr double kWideLatency_ms = 10;
 constexpr double kWideInset_mm = 3;
 /// Odds that a stated prior holds, before the points speak.
 constexpr double kPriorHolds_nats = 3;
+constexpr double kFreeMember_nats = 2;
 
 Row row_of(const TemplateFields& fields, const Crossing& crossing, const Match& m, const CentredPose& pose,
            bool inset_everywhere) {
@@ -167,6 +168,7 @@ class Refinement {
   Fit run() {
     find_members();
     choose_inset();
+    free_outlying_members();
     for (int step = 0; step < 4; ++step) iterate(step);
     finish();
     return std::move(fit_);
@@ -275,6 +277,46 @@ class Refinement {
       equations.add(member_of(i), row, inlier / (sigma * sigma));
     }
     return equations.solve_over_scales(free_).log_evidence;
+  }
+
+  /// One member far off among members that are as drawn must not widen the tolerance of all: it is set free
+  /// when the evidence pays for its freedom.
+  void free_outlying_members() {
+    NormalEquations equations(fields_.member_centroids(), priors_);
+    if (priors_.member_shift_mm <= 0) return;
+    place();
+    weigh_mixture(equations);
+    double held = equations.solve_over_scales(free_).log_evidence;
+    for (std::size_t freed = 0; freed < std::max<std::size_t>(1, free_.size() / 4); ++freed) {
+      std::size_t best = free_.size();
+      double gain = kFreeMember_nats;
+      for (const std::size_t m : most_displaced(equations)) {
+        free_[m] = true;
+        const double evidence = equations.solve_over_scales(free_).log_evidence;
+        free_[m] = false;
+        if (evidence - held > gain) gain = evidence - held, best = m;
+      }
+      if (best == free_.size()) return;
+      free_[best] = true;
+      held += gain;
+    }
+  }
+
+  /// The three members that strain most at a tight tolerance.
+  std::vector<std::size_t> most_displaced(const NormalEquations& equations) const {
+    const Solution tight = equations.solve(0.5, free_, true);
+    std::vector<std::pair<double, std::size_t>> strain;
+    for (std::size_t m = 0; m < free_.size(); ++m) {
+      const MemberShift& u = tight.members[m].shift;
+      const double turned = u.z() / std::max(priors_.member_angle_rad, 1e-4);
+      if (!free_[m]) strain.push_back({-u.head<2>().norm() / priors_.member_shift_mm - std::abs(turned), m});
+    }
+    std::sort(strain.begin(), strain.end());
+    std::vector<std::size_t> out;
+    for (std::size_t i = 0; i < std::min<std::size_t>(3, strain.size()); ++i) {
+      if (strain[i].first < -0.5) out.push_back(strain[i].second);
+    }
+    return out;
   }
 
   void iterate(int step) {

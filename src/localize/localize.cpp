@@ -44,12 +44,6 @@ struct Candidate {
   bool turned = false;
 };
 
-bool inside(const SearchBox& box, const CentredPose& pose) {
-  return (pose.centre - box.planned.centre).cwiseAbs().maxCoeff() <= box.range_mm + 12 &&
-         (box.range_rad >= kPi ||
-          std::abs(wrap_pi(pose.theta_rad - box.planned.theta_rad)) <= box.range_rad + rad(1.5));
-}
-
 /// One run of the robust method over ready crossings.
 class Solver {
  public:
@@ -57,7 +51,8 @@ class Solver {
          const std::vector<Crossing>& crossings, std::span<const PathPiece> path,
          const LocalizeOptions& options)
       : outline_(outline), fields_(fields), crossings_(crossings), path_(path), options_(options) {
-    box_ = {centred_pose(outline, options.planned), options.range_mm, std::min(options.range_rad, kPi)};
+    box_ = {centred_pose(outline, options.planned), options.range_mm, std::min(options.range_rad, kPi),
+            Vec2(-outline.centroid)};
     priors_.latency_ms = 1e3 * options.latency_sigma_s;
     priors_.inset_mm = options.inset_sigma_mm;
     priors_.member_shift_mm = options.member_shift_sigma_mm;
@@ -66,12 +61,14 @@ class Solver {
 
   /// False when no pose of the range brings a single point near an edge.
   bool run(std::span<const EdgePoint> edges, Localization& result) {
+    medium_ = sampled(crossings_, 400);
     collect_candidates();
     if (candidates_.empty()) return false;
-    FitState start = polish(fields_, crossings_, candidates_.front().state.pose, 4, &iterations_);
-    fit_ = refine(fields_, crossings_, start, priors_);
+    fit_ = refine(fields_, crossings_,
+                  polish(fields_, medium_, candidates_.front().state.pose, 4, &iterations_), priors_);
     evidence_ = gather_evidence(fields_, path_, fit_);
     weigh_rivals();
+    add_exposed(outline_, crossings_, fit_, evidence_);
     fill(result);
     fill_points(edges, result);
     decide({outline_, fields_, options_, crossings_, path_, fit_, evidence_, rivals_}, result);
@@ -81,29 +78,27 @@ class Solver {
  private:
   void collect_candidates() {
     const std::vector<Crossing> few = sampled(crossings_, kSearchPoints);
-    const std::vector<Crossing> many = sampled(crossings_, 400);
     for (const Mode& mode : search(fields_, crossings_, box_, kModes)) {
       if (!candidates_.empty() && mode.score < 0.5 * best_score_) break;
       best_score_ = std::max(best_score_, mode.score);
-      consider(few, many, mode.pose, false);
+      consider(few, mode.pose, false);
     }
     if (candidates_.empty()) return;
     order();
-    add_turned(few, many);
+    add_turned(few);
     order();
     prefer_planned_turn();
   }
 
-  void consider(const std::vector<Crossing>& few, const std::vector<Crossing>& many, const CentredPose& from,
-                bool turned) {
+  void consider(const std::vector<Crossing>& few, const CentredPose& from, bool turned) {
     Candidate candidate;
     candidate.state = polish(fields_, few, from, turned ? 6 : 12, &iterations_);
     candidate.turned = turned;
-    if (!inside(box_, candidate.state.pose)) return;
+    if (!box_.holds(candidate.state.pose, 12, rad(1.5))) return;
     for (const Candidate& other : candidates_) {
       if (same_place(fields_, other.state.pose, candidate.state.pose)) return;
     }
-    candidate.likelihood = rough_log_likelihood(fields_, many, candidate.state);
+    candidate.likelihood = rough_log_likelihood(fields_, medium_, candidate.state);
     candidates_.push_back(std::move(candidate));
   }
 
@@ -113,12 +108,12 @@ class Solver {
   }
 
   /// The near-symmetric images of the best pose, where the range admits them.
-  void add_turned(const std::vector<Crossing>& few, const std::vector<Crossing>& many) {
+  void add_turned(const std::vector<Crossing>& few) {
     const Pose2 best = part_pose(outline_, candidates_.front().state.pose);
     for (const workpiece::Symmetry& symmetry : outline_.symmetries) {
       if (symmetry.gap_mm == 0) continue;
       const CentredPose turned = centred_pose(outline_, best * symmetry.map);
-      if (inside(box_, turned)) consider(few, many, turned, true);
+      if (box_.holds(turned, 12, rad(1.5))) consider(few, turned, true);
     }
   }
 
@@ -152,8 +147,8 @@ class Solver {
       if (candidates_.front().likelihood - candidate.likelihood > kFarBehind_nats) break;
       if (image_of_found(candidate.state.pose)) continue;
       Rival rival;
-      const FitState start = polish(fields_, crossings_, candidate.state.pose, 4, &iterations_);
-      rival.fit = refine(fields_, crossings_, start, priors_);
+      rival.fit = refine(fields_, crossings_, polish(fields_, medium_, candidate.state.pose, 4, &iterations_),
+                         priors_);
       if (image_of_found(rival.fit.state.pose)) continue;
       rival.turned = candidate.turned;
       rival.gap_nats =
@@ -251,6 +246,7 @@ class Solver {
   const LocalizeOptions& options_;
   SearchBox box_;
   Priors priors_;
+  std::vector<Crossing> medium_;  ///< at most 400, evenly
   double best_score_ = 0;
   int iterations_ = 0;
   std::vector<Candidate> candidates_;

@@ -30,15 +30,15 @@ CommonMatrix prior_information(const Priors& priors) {
 struct Scale {
   double k, log_prior;
 };
-constexpr std::array<Scale, 9> kScales{{{0, -1.1},
-                                        {0.1, -2.6},
-                                        {0.2, -2.4},
-                                        {0.35, -2.2},
-                                        {0.6, -1.9},
-                                        {0.9, -1.7},
-                                        {1.3, -1.9},
-                                        {1.9, -2.4},
-                                        {2.8, -3.4}}};
+constexpr std::array<Scale, 9> kScales{{{0, -0.35},
+                                        {0.1, -5.0},
+                                        {0.2, -5.0},
+                                        {0.35, -4.2},
+                                        {0.6, -3.2},
+                                        {0.9, -2.4},
+                                        {1.3, -2.4},
+                                        {1.9, -3.0},
+                                        {2.8, -4.2}}};
 
 }  // namespace
 

@@ -141,43 +141,76 @@ std::vector<Crossing> sampled(const std::vector<Crossing>& crossings, std::size_
   return out;
 }
 
+namespace {
+
+Vec2 turned(const Vec2& v, double theta) {
+  return {std::cos(theta) * v.x() - std::sin(theta) * v.y(),
+          std::sin(theta) * v.x() + std::cos(theta) * v.y()};
+}
+
+/// Where the centroid may lie at one turn: about where it is planned, or where turning about the part's
+/// origin carries it; one square for both when they overlap well.
+struct Square {
+  Vec2 centre;
+  double reach_mm;
+};
+std::vector<Square> squares(const SearchBox& box, double theta) {
+  const double reach = box.range_mm + kRangeMargin_mm;
+  const Vec2 planned = box.planned.centre;
+  const Vec2 carried = planned + turned(box.origin, box.planned.theta_rad) - turned(box.origin, theta);
+  const double apart = (carried - planned).cwiseAbs().maxCoeff();
+  if (apart <= 0.8 * reach) return {{0.5 * (planned + carried), reach + 0.5 * apart}};
+  return {{planned, reach}, {carried, reach}};
+}
+
+/// The best two shifts of one square at one turn.
+void search_square(const TemplateFields& fields, const std::vector<Crossing>& points, const Square& square,
+                   double theta, std::vector<Mode>& found) {
+  const double c = std::cos(theta), s = std::sin(theta), cell = fields.cell_mm();
+  ShiftScores scores(static_cast<int>(std::ceil(square.reach_mm * (std::abs(c) + std::abs(s)) / cell)));
+  const int middle = (scores.side() - 1) / 2;
+  for (const Crossing& point : points) {
+    const Vec2 d = point.point - square.centre;
+    const double x = (c * d.x() + s * d.y() - fields.origin().x()) / cell;
+    const double y = (-s * d.x() + c * d.y() - fields.origin().y()) / cell;
+    if (!(std::abs(x) < 1e6 && std::abs(y) < 1e6)) continue;
+    const int bin = point.signed_step ? bin_of(point.inward_rad - theta) : kAnyBin;
+    scores.add(fields, fields.scores(bin), static_cast<int>(std::floor(y)), static_cast<int>(std::floor(x)));
+  }
+  // A cell (row, column) stands for points shifted by it in part axes: the centroid moves the other way.
+  const auto shift_of = [&](int row, int column) {
+    return Vec2(-turned({(column - middle) * cell, (row - middle) * cell}, theta));
+  };
+  const auto allowed = [&](int row, int column) {
+    return shift_of(row, column).cwiseAbs().maxCoeff() <= square.reach_mm;
+  };
+  Peak first, second;
+  two_peaks(scores, allowed, first, second);
+  for (const Peak& peak : {first, second}) {
+    if (peak.sum <= 0) continue;
+    found.push_back({{square.centre + shift_of(peak.row, peak.column), wrap_pi(theta)},
+                     peak.sum / (255.0 * static_cast<double>(points.size()))});
+  }
+}
+
+}  // namespace
+
+bool SearchBox::holds(const CentredPose& pose, double slack_mm, double slack_rad) const {
+  const Vec2 origin_off =
+      pose.centre + turned(origin, pose.theta_rad) - planned.centre - turned(origin, planned.theta_rad);
+  const double off =
+      std::min((pose.centre - planned.centre).cwiseAbs().maxCoeff(), origin_off.cwiseAbs().maxCoeff());
+  return off <= range_mm + slack_mm &&
+         (range_rad >= kPi || std::abs(wrap_pi(pose.theta_rad - planned.theta_rad)) <= range_rad + slack_rad);
+}
+
 std::vector<Mode> search(const TemplateFields& fields, const std::vector<Crossing>& crossings,
                          const SearchBox& box, std::size_t max_modes) {
   const std::vector<Crossing> points = sampled(crossings, kSearchPoints);
   std::vector<Mode> found;
   if (points.empty()) return found;
-  const double reach = box.range_mm + kRangeMargin_mm;
-  const double cell = fields.cell_mm();
   for (const double theta : turns(fields, box)) {
-    const double c = std::cos(theta), s = std::sin(theta);
-    const double square = reach * (std::abs(c) + std::abs(s));
-    ShiftScores scores(static_cast<int>(std::ceil(square / cell)));
-    const int middle = (scores.side() - 1) / 2;
-    for (const Crossing& point : points) {
-      const Vec2 d = point.point - box.planned.centre;
-      const double x = (c * d.x() + s * d.y() - fields.origin().x()) / cell;
-      const double y = (-s * d.x() + c * d.y() - fields.origin().y()) / cell;
-      if (!(std::abs(x) < 1e6 && std::abs(y) < 1e6)) continue;
-      const int bin = point.signed_step ? bin_of(point.inward_rad - theta) : kAnyBin;
-      scores.add(fields, fields.scores(bin), static_cast<int>(std::floor(y)),
-                 static_cast<int>(std::floor(x)));
-    }
-    // A cell (row, column) stands for points shifted by it in part axes: the centroid moves the other way.
-    const auto shift_of = [&](int row, int column) {
-      const double x = (column - middle) * cell, y = (row - middle) * cell;
-      return Vec2(-(c * x - s * y), -(s * x + c * y));
-    };
-    const auto allowed = [&](int row, int column) {
-      return shift_of(row, column).cwiseAbs().maxCoeff() <= reach;
-    };
-    Peak first, second;
-    two_peaks(scores, allowed, first, second);
-    for (const Peak& peak : {first, second}) {
-      if (peak.sum <= 0) continue;
-      const Vec2 shift = shift_of(peak.row, peak.column);
-      found.push_back({{box.planned.centre + shift, wrap_pi(theta)},
-                       peak.sum / (255.0 * static_cast<double>(points.size()))});
-    }
+    for (const Square& square : squares(box, theta)) search_square(fields, points, square, theta, found);
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const Mode& a, const Mode& b) { return a.score > b.score; });

@@ -16,8 +16,12 @@ struct CentredPose {
 
 struct SearchBox {
   CentredPose planned;
-  double range_mm = 50;  ///< each axis of Base
+  double range_mm = 50;  ///< each axis of Base, for the centroid or for the part's origin
   double range_rad = 0.35;
+  Vec2 origin = Vec2::Zero();  ///< the part's origin seen from the centroid, frame Part
+
+  /// Whether centroid or origin keep the range, with some slack.
+  bool holds(const CentredPose& pose, double slack_mm, double slack_rad) const;
 };
 
 struct Mode {
