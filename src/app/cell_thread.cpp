@@ -71,7 +71,8 @@ void CellThread::drain() {
   }
   thread_local LaserItem laser;
   while (wiring_.laser.pop(laser)) {
-    if (cell_.wants_laser()) feed(laser.arrival, job::LaserBytes{{laser.bytes.begin(), laser.bytes.begin() + laser.size}});
+    if (cell_.wants_laser())
+      feed(laser.arrival, job::LaserBytes{{laser.bytes.begin(), laser.bytes.begin() + laser.size}});
   }
   if (const std::uint64_t lost = wiring_.laser.dropped(); lost != laser_lost_) {
     feed(adapters::now(), job::Overrun{job::Link::Laser, lost - laser_lost_});
@@ -109,7 +110,9 @@ void CellThread::dispatch(const job::Outputs& outputs) {
 void CellThread::dispatch(const job::Output& output) {
   if (auto order = job::work_order(output, cell_, wiring_.setup)) {
     if (order->kind == job::WorkKind::Solve) solve_asked_ = adapters::now();
-    wiring_.work.push([this, order = std::move(*order)] { wiring_.inbox.push({job::run(order), nullptr, nullptr}); });
+    wiring_.work.push([this, order = std::move(*order)] {
+      wiring_.inbox.push({job::run(order), nullptr, nullptr});
+    });
   } else if (std::holds_alternative<job::ImportRequest>(output)) {
     order_import();
   } else if (const auto* request = std::get_if<job::RobotRequest>(&output)) {
@@ -163,7 +166,8 @@ void CellThread::begin_job(const std::shared_ptr<const ActiveJob>& job) {
   header.arm_yaml = arm_yaml_;
   header.job_yaml = job->job_yaml;
   header.initial_json = memory_json(cell_.memory());
-  record_ = std::make_unique<RecordWriter>([journal = journal_](std::span<const std::byte> b) { journal->write(b); }, header);
+  record_ = std::make_unique<RecordWriter>(
+      [journal = journal_](std::span<const std::byte> b) { journal->write(b); }, header);
 }
 
 void CellThread::save(const job::SaveState& state) {
@@ -193,15 +197,16 @@ void CellThread::end_job(const job::FinishJob& finish) {
   if (const auto solution = cell_.solution(); record_ && solution && !solution->rapid.empty()) {
     record_->attachment("WeldcellJob.mod", "text/plain", adapters::now(), solution->rapid);
   }
-  if (record_) record_->attachment("result.json", "application/json", adapters::now(), story_->result_json(cell_));
+  if (record_)
+    record_->attachment("result.json", "application/json", adapters::now(), story_->result_json(cell_));
   // The outputs of this very step must be in the record too: feed() wrote them before dispatching.
   close_record();
   auto page = std::make_shared<review::ReportInput>(
       story_->report(cell_, *wiring_.setup, WELDCELL_VERSION, accepted_at_));
   page->texts = {{"job.yaml", active_->job_yaml}, {"cell.yaml", wiring_.config.text}};
   const auto solution = cell_.solution();
-  wiring_.work.push([this, page, solution, finish, result = story_->result_json(cell_), folder = active_->folder,
-                     id = active_->arrived.id] {
+  wiring_.work.push([this, page, solution, finish, result = story_->result_json(cell_),
+                     folder = active_->folder, id = active_->arrived.id] {
     const auto write = [&](const char* name, const std::string& text) {
       const Status written = write_file_durably(folder + "/" + name, text);
       if (!written.ok()) spdlog::error("{}", written.error().text());

@@ -1,4 +1,5 @@
-// The cell thread: drains the rings, steps the brain, carries out what it says, and writes the record. Ordinary priority.
+// The cell thread: drains the rings, steps the brain, carries out what it says, and writes the record.
+// Ordinary priority.
 #pragma once
 
 #include <fstream>

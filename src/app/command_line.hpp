@@ -13,7 +13,8 @@ namespace weldcell::app {
 class CommandLine {
  public:
   /// `usage` is what --help prints. Names in `valued` take a value, those in `flags` none.
-  CommandLine(Arguments arguments, std::string usage, std::vector<std::string> valued, std::vector<std::string> flags);
+  CommandLine(Arguments arguments, std::string usage, std::vector<std::string> valued,
+              std::vector<std::string> flags);
 
   /// Set when the command must end at once: 0 after --help, 2 after a fault (already told on stderr).
   std::optional<int> exit_code() const { return exit_code_; }

@@ -17,12 +17,16 @@ namespace {
 using nlohmann::json;
 
 json plan_json(const job::Prepared& prepared) {
-  json out{{"planned", {{"x_mm", prepared.planned.x_mm}, {"y_mm", prepared.planned.y_mm}, {"theta_deg", deg(prepared.planned.theta_rad)}}},
+  json out{{"planned",
+            {{"x_mm", prepared.planned.x_mm},
+             {"y_mm", prepared.planned.y_mm},
+             {"theta_deg", deg(prepared.planned.theta_rad)}}},
            {"scan_seconds", prepared.scan->duration_s()},
            {"scan_paths", prepared.paths.size()},
            {"visible_edges", prepared.outline.edges.size()}};
   out["guidance"] = json::array();
-  for (const auto& step : prepared.steps) out["guidance"].push_back({{"title", step.title}, {"fixtures", step.fixtures.size()}});
+  for (const auto& step : prepared.steps)
+    out["guidance"].push_back({{"title", step.title}, {"fixtures", step.fixtures.size()}});
   out["welds"] = json::array();
   for (const auto& weld : prepared.nominal) {
     out["welds"].push_back({{"name", weld.name}, {"tolerance_mm", weld.tolerance_mm}, {"reachable", true}});
@@ -81,13 +85,16 @@ int command_plan(Arguments arguments) {
     std::printf("%s\n", plan_json(*prepared).dump().c_str());
     return 0;
   }
-  std::printf("%s: planned at %.1f, %.1f mm, %.2f deg\n", job.order.name.c_str(), prepared->planned.x_mm, prepared->planned.y_mm,
-              deg(prepared->planned.theta_rad));
+  std::printf("%s: planned at %.1f, %.1f mm, %.2f deg\n", job.order.name.c_str(), prepared->planned.x_mm,
+              prepared->planned.y_mm, deg(prepared->planned.theta_rad));
   std::printf("scan: %zu paths, %.1f s\n", prepared->paths.size(), prepared->scan->duration_s());
-  for (const auto& step : prepared->steps) std::printf("guidance: %s (%zu magnets)\n", step.title.c_str(), step.fixtures.size());
-  for (const auto& weld : prepared->nominal) std::printf("weld %s: reachable, tolerance %.2f mm\n", weld.name.c_str(), weld.tolerance_mm);
+  for (const auto& step : prepared->steps)
+    std::printf("guidance: %s (%zu magnets)\n", step.title.c_str(), step.fixtures.size());
+  for (const auto& weld : prepared->nominal)
+    std::printf("weld %s: reachable, tolerance %.2f mm\n", weld.name.c_str(), weld.tolerance_mm);
   for (const auto& s : prepared->outline.symmetries) {
-    std::printf("%s by %.1f deg (gap %.2f mm)\n", s.gap_mm < 0.01 ? "symmetric" : "nearly symmetric", deg(s.map.theta_rad), s.gap_mm);
+    std::printf("%s by %.1f deg (gap %.2f mm)\n", s.gap_mm < 0.01 ? "symmetric" : "nearly symmetric",
+                deg(s.map.theta_rad), s.gap_mm);
   }
   return 0;
 }

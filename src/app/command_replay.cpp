@@ -42,9 +42,11 @@ void print_table(const std::string& recorded, const std::string& now) {
   row("edge points", a["points"], b["points"]);
   row("inliers", a["inliers"], b["inliers"]);
   for (std::size_t i = 0; i < a["welds"].size() && i < b["welds"].size(); ++i) {
-    row("bound_mm " + a["welds"][i]["name"].get<std::string>(), a["welds"][i]["bound_mm"], b["welds"][i]["bound_mm"]);
+    row("bound_mm " + a["welds"][i]["name"].get<std::string>(), a["welds"][i]["bound_mm"],
+        b["welds"][i]["bound_mm"]);
   }
-  std::printf("%-22s %16s %16s\n", "verdict", a["verdict"].get<std::string>().c_str(), b["verdict"].get<std::string>().c_str());
+  std::printf("%-22s %16s %16s\n", "verdict", a["verdict"].get<std::string>().c_str(),
+              b["verdict"].get<std::string>().c_str());
 }
 
 /// The record cut behind the last answer of the named step.
@@ -61,11 +63,12 @@ void keep_until(Record& record, const std::string& stage) {
 }  // namespace
 
 int command_replay(Arguments arguments) {
-  CommandLine line(arguments,
-                   "usage: weldcell replay RECORD [--until import|plan|pass|solve] [--set KEY=VALUE]... [--json]\n"
-                   "Runs the record through the same code and compares every output to the bit: exit 0 identical, 1 not.\n"
-                   "With --set (dotted key of the cell file, or job.KEY) it answers 'what if' with a difference table.\n",
-                   {"until", "set"}, {"json"});
+  CommandLine line(
+      arguments,
+      "usage: weldcell replay RECORD [--until import|plan|pass|solve] [--set KEY=VALUE]... [--json]\n"
+      "Runs the record through the same code and compares every output to the bit: exit 0 identical, 1 not.\n"
+      "With --set (dotted key of the cell file, or job.KEY) it answers 'what if' with a difference table.\n",
+      {"until", "set"}, {"json"});
   if (line.exit_code()) return *line.exit_code();
   if (line.plain().size() != 1) return line.refuse("replay wants one record");
   auto record = open_record(line.plain()[0]);
@@ -89,16 +92,19 @@ int command_replay(Arguments arguments) {
     return 0;
   }
   std::vector<Error> faults = record->damage;
-  faults.insert(faults.end(), outcome->differences.begin(), outcome->differences.end());
+  // What differs behind the first difference follows from it.
+  if (!outcome->differences.empty()) faults.push_back(outcome->differences.front());
   if (!record->complete) {
-    faults.push_back({"record.cut", "end of file", "the record has no footer: its daemon ended in the middle of the job", ""});
+    faults.push_back({"record.cut", "end of file",
+                      "the record has no footer: its daemon ended in the middle of the job", ""});
   }
   if (line.has("json")) {
     nlohmann::json out{{"identical", faults.empty()}, {"steps", outcome->steps}, {"solves", outcome->solves}};
     for (const Error& fault : faults) out["differences"].push_back(fault.text());
     std::printf("%s\n", out.dump().c_str());
   } else if (faults.empty()) {
-    std::printf("identical: %zu inputs, %zu localizations, every output equal\n", outcome->steps, outcome->solves);
+    std::printf("identical: %zu inputs, %zu localizations, every output equal\n", outcome->steps,
+                outcome->solves);
   } else {
     std::printf("not identical: %zu fault(s)\n", faults.size());
     for (const Error& fault : faults) std::printf("%s\n", fault.text().c_str());
@@ -111,9 +117,12 @@ int command_review(Arguments arguments) {
   for (const char*& argument : spelled) {
     if (std::string_view(argument) == "-o") argument = "--output";
   }
-  CommandLine whole(spelled, "usage: weldcell review RECORD -o report.html\nOne self-contained page of the job.\n", {"output"}, {});
+  CommandLine whole(spelled,
+                    "usage: weldcell review RECORD -o report.html\nOne self-contained page of the job.\n",
+                    {"output"}, {});
   if (whole.exit_code()) return *whole.exit_code();
-  if (whole.plain().size() != 1 || !whole.has("output")) return whole.refuse("review wants RECORD -o report.html");
+  if (whole.plain().size() != 1 || !whole.has("output"))
+    return whole.refuse("review wants RECORD -o report.html");
   const auto record = open_record(whole.plain()[0]);
   if (!record.ok()) return tell(record.error());
   const auto outcome = replay(*record, {});
@@ -131,8 +140,9 @@ namespace {
 void dump_points(const job::Solution& solution) {
   std::puts("time_s,x_mm,y_mm,z_mm,vx_mm_s,vy_mm_s,code");
   for (const auto& p : solution.evidence.shown) {
-    std::printf("%.6f,%.3f,%.3f,%.3f,%.1f,%.1f,%u\n", seconds(p.time.ns), static_cast<double>(p.x_mm), static_cast<double>(p.y_mm),
-                static_cast<double>(p.z_mm), static_cast<double>(p.vx_mm_s), static_cast<double>(p.vy_mm_s), p.code);
+    std::printf("%.6f,%.3f,%.3f,%.3f,%.1f,%.1f,%u\n", seconds(p.time.ns), static_cast<double>(p.x_mm),
+                static_cast<double>(p.y_mm), static_cast<double>(p.z_mm), static_cast<double>(p.vx_mm_s),
+                static_cast<double>(p.vy_mm_s), p.code);
   }
 }
 
@@ -210,7 +220,8 @@ int command_dump(Arguments arguments) {
   if (topic == "welds") {
     std::puts("name,bound_mm,tolerance_mm,gap_mm,verdict");
     for (const auto& c : solution->certificates) {
-      std::printf("%s,%.4f,%.4f,%.4f,%s\n", c.name.c_str(), c.bound_mm, c.tolerance_mm, c.gap_mm, localize::to_string(c.verdict));
+      std::printf("%s,%.4f,%.4f,%.4f,%s\n", c.name.c_str(), c.bound_mm, c.tolerance_mm, c.gap_mm,
+                  localize::to_string(c.verdict));
     }
   }
   return 0;

@@ -21,7 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr const char* kConfigHelp = "  --config CELL   the daemon's cell file (default /etc/weldcell/cell.yaml)\n";
+constexpr const char* kConfigHelp =
+    "  --config CELL   the daemon's cell file (default /etc/weldcell/cell.yaml)\n";
 
 std::optional<files::CellConfig> config_of(const CommandLine& line) {
   auto read = files::read_cell_file(line.value("config", "/etc/weldcell/cell.yaml"));
@@ -34,7 +35,8 @@ std::optional<files::CellConfig> config_of(const CommandLine& line) {
 
 /// Exit code; the answer in `out`.
 int ask(const files::CellConfig& config, const json& question, json& out) {
-  const auto answer = adapters::control_request(config.state_dir + "/weldcelld.sock", question.dump(), 3 * kSecond);
+  const auto answer =
+      adapters::control_request(config.state_dir + "/weldcelld.sock", question.dump(), 3 * kSecond);
   if (!answer.ok()) {
     std::fprintf(stderr, "%s\n", answer.error().text().c_str());
     return 3;
@@ -46,10 +48,13 @@ int ask(const files::CellConfig& config, const json& question, json& out) {
 void print_status(const json& s) {
   std::printf("%s%s", s.value("state", "?").c_str(), s.value("armed", false) ? ", armed" : ", not armed");
   if (!s.value("job", "").empty()) std::printf(", job %s", s.value("job", "").c_str());
-  if (s.value("guide_step", 0) > 0) std::printf(", place member %d of %d and confirm", s.value("guide_step", 0), s.value("guide_steps", 0));
-  if (s.value("state", "") == "Scanning" || s.value("state", "") == "Welding") std::printf(", %.0f %%", 100 * s.value("progress", 0.0));
+  if (s.value("guide_step", 0) > 0)
+    std::printf(", place member %d of %d and confirm", s.value("guide_step", 0), s.value("guide_steps", 0));
+  if (s.value("state", "") == "Scanning" || s.value("state", "") == "Welding")
+    std::printf(", %.0f %%", 100 * s.value("progress", 0.0));
   std::printf("\nlinks:");
-  for (const auto& [name, up] : s.value("links", json::object()).items()) std::printf("  %s %s", name.c_str(), up.get<bool>() ? "up" : "DOWN");
+  for (const auto& [name, up] : s.value("links", json::object()).items())
+    std::printf("  %s %s", name.c_str(), up.get<bool>() ? "up" : "DOWN");
   if (!s.value("fault", "").empty()) std::printf("\nfault: %s", s.value("fault", "").c_str());
   std::printf("\n");
 }
@@ -57,9 +62,12 @@ void print_status(const json& s) {
 }  // namespace
 
 int command_submit(Arguments arguments) {
-  CommandLine line(arguments, std::string("usage: weldcell submit JOB.yaml [FILE...] [--config CELL | --spool DIR]\n"
-                                          "Drops the job with its workpiece or CAD files into the spool, all or nothing.\n") + kConfigHelp,
-                   {"config", "spool"}, {});
+  CommandLine line(
+      arguments,
+      std::string("usage: weldcell submit JOB.yaml [FILE...] [--config CELL | --spool DIR]\n"
+                  "Drops the job with its workpiece or CAD files into the spool, all or nothing.\n") +
+          kConfigHelp,
+      {"config", "spool"}, {});
   if (line.exit_code()) return *line.exit_code();
   if (line.plain().empty()) return line.refuse("submit wants a job file");
   std::string spool = line.value("spool");
@@ -79,8 +87,9 @@ int command_submit(Arguments arguments) {
 }
 
 int command_status(Arguments arguments) {
-  CommandLine line(arguments, std::string("usage: weldcell status [--watch] [--json] [--config CELL]\n") + kConfigHelp, {"config"},
-                   {"watch", "json"});
+  CommandLine line(arguments,
+                   std::string("usage: weldcell status [--watch] [--json] [--config CELL]\n") + kConfigHelp,
+                   {"config"}, {"watch", "json"});
   if (line.exit_code()) return *line.exit_code();
   const auto config = config_of(line);
   if (!config) return 2;
@@ -99,7 +108,8 @@ int command_status(Arguments arguments) {
 }
 
 int command_jobs(Arguments arguments) {
-  CommandLine line(arguments, std::string("usage: weldcell jobs [--json] [--config CELL]\n") + kConfigHelp, {"config"}, {"json"});
+  CommandLine line(arguments, std::string("usage: weldcell jobs [--json] [--config CELL]\n") + kConfigHelp,
+                   {"config"}, {"json"});
   if (line.exit_code()) return *line.exit_code();
   const auto config = config_of(line);
   if (!config) return 2;
@@ -125,8 +135,11 @@ int command_jobs(Arguments arguments) {
 }
 
 int command_show(Arguments arguments) {
-  CommandLine line(arguments, std::string("usage: weldcell show JOB [--config CELL]\nIts result, and where its files lie.\n") + kConfigHelp,
-                   {"config"}, {});
+  CommandLine line(
+      arguments,
+      std::string("usage: weldcell show JOB [--config CELL]\nIts result, and where its files lie.\n") +
+          kConfigHelp,
+      {"config"}, {});
   if (line.exit_code()) return *line.exit_code();
   if (line.plain().size() != 1) return line.refuse("show wants a job's name");
   const auto config = config_of(line);
@@ -136,22 +149,26 @@ int command_show(Arguments arguments) {
     std::error_code error;
     if (!fs::exists(folder, error)) continue;
     std::printf("%s: %s\n", place, folder.c_str());
-    for (const auto& entry : fs::directory_iterator(folder, error)) std::printf("  %s\n", entry.path().filename().c_str());
+    for (const auto& entry : fs::directory_iterator(folder, error))
+      std::printf("  %s\n", entry.path().filename().c_str());
     const auto result = read_file((folder / "result.json").string());
     if (result.ok()) std::printf("%s\n", result->c_str());
     const auto reason = read_file(folder.string() + ".reason");
     if (reason.ok()) std::printf("%s\n", reason->c_str());
     return 0;
   }
-  std::fprintf(stderr, "no job '%s' in %s: weldcell jobs lists them\n", line.plain()[0].c_str(), config->spool_dir.c_str());
+  std::fprintf(stderr, "no job '%s' in %s: weldcell jobs lists them\n", line.plain()[0].c_str(),
+               config->spool_dir.c_str());
   return 2;
 }
 
 int command_operate(Arguments arguments) {
-  CommandLine line(arguments,
-                   std::string("usage: weldcell operate arm|start|confirm|stop|resume|reset|abort [--config CELL]\n"
-                               "What an operator may order. Nothing moves before 'arm'.\n") + kConfigHelp,
-                   {"config"}, {});
+  CommandLine line(
+      arguments,
+      std::string("usage: weldcell operate arm|start|confirm|stop|resume|reset|abort [--config CELL]\n"
+                  "What an operator may order. Nothing moves before 'arm'.\n") +
+          kConfigHelp,
+      {"config"}, {});
   if (line.exit_code()) return *line.exit_code();
   if (line.plain().size() != 1) return line.refuse("operate wants one order");
   const auto config = config_of(line);

@@ -42,7 +42,8 @@ std::vector<VirtualOutcome> run(const Trials& trials, const sim::Scene& first) {
   const bool progress = ::isatty(2) != 0;
   const auto work = [&] {
     for (int i = next++; i < trials.count; i = next++) {
-      auto scene = sim::read_scene(trials.scene_file, trials.config, trials.seed + static_cast<std::uint64_t>(i));
+      auto scene =
+          sim::read_scene(trials.scene_file, trials.config, trials.seed + static_cast<std::uint64_t>(i));
       outcomes[static_cast<std::size_t>(i)] =
           run_virtual(trials.config, i == 0 ? first : std::get<sim::Scene>(scene), trials.job);
       if (progress) {
@@ -58,15 +59,17 @@ std::vector<VirtualOutcome> run(const Trials& trials, const sim::Scene& first) {
   return outcomes;
 }
 
-Status keep_edges(const std::string& folder, std::uint64_t seed, const std::vector<VirtualOutcome>& outcomes) {
+Status keep_edges(const std::string& folder, std::uint64_t seed,
+                  const std::vector<VirtualOutcome>& outcomes) {
   for (std::size_t i = 0; i < outcomes.size(); ++i) {
     const VirtualOutcome& o = outcomes[i];
     if (!o.solution) continue;
     const std::string stem = folder + "/" + std::to_string(seed + i);
     const json truth{{"x_mm", o.truth.x_mm}, {"y_mm", o.truth.y_mm}, {"theta_deg", deg(o.truth.theta_rad)}};
-    for (const auto& [ending, text] : {std::pair<std::string, std::string>{".edges.csv", files::edges_csv(o.solution->evidence.edges)},
-                                       {".path.csv", files::path_csv(o.solution->evidence.path)},
-                                       {".truth.json", truth.dump() + "\n"}}) {
+    for (const auto& [ending, text] :
+         {std::pair<std::string, std::string>{".edges.csv", files::edges_csv(o.solution->evidence.edges)},
+          {".path.csv", files::path_csv(o.solution->evidence.path)},
+          {".truth.json", truth.dump() + "\n"}}) {
       if (const Status written = write_file_durably(stem + ending, text); !written.ok()) return written;
     }
   }
@@ -97,19 +100,23 @@ json spread_json(const Spread& s) { return {{"std", s.std}, {"rms", s.rms}, {"wo
 }  // namespace
 
 int command_trials(Arguments arguments) {
-  CommandLine line(arguments,
-                   "usage: weldcell trials --workpiece NAME|SCENE.yaml [--count 150] [--seed 1] [--threads 2] [--weld] [--json]\n"
-                   "Jobs with drawn placements, clocks, noise and latency through the whole chain in virtual time: planning,\n"
-                   "EGM bytes, laser bytes, alignment, edges, pose, certificates, RAPID; no sockets, no sleeping.\n"
-                   "  --job JOB.yaml   the job (default config/jobs/demo-NAME.yaml)\n"
-                   "  --cell CELL      the cell (default config/cell-demo.yaml)\n"
-                   "  --weld           also run the weld programs and measure the torch on the true seams\n"
-                   "  --each           a line a trial on stderr, and the log of those that failed\n"
-                   "  --edges DIR      write SEED.edges.csv, SEED.path.csv and SEED.truth.json of each trial there\n",
-                   {"workpiece", "count", "seed", "threads", "job", "cell", "edges"}, {"json", "weld", "each"});
+  CommandLine line(
+      arguments,
+      "usage: weldcell trials --workpiece NAME|SCENE.yaml [--count 150] [--seed 1] [--threads 2] [--weld] "
+      "[--json]\n"
+      "Jobs with drawn placements, clocks, noise and latency through the whole chain in virtual time: "
+      "planning,\n"
+      "EGM bytes, laser bytes, alignment, edges, pose, certificates, RAPID; no sockets, no sleeping.\n"
+      "  --job JOB.yaml   the job (default config/jobs/demo-NAME.yaml)\n"
+      "  --cell CELL      the cell (default config/cell-demo.yaml)\n"
+      "  --weld           also run the weld programs and measure the torch on the true seams\n"
+      "  --each           a line a trial on stderr, and the log of those that failed\n"
+      "  --edges DIR      write SEED.edges.csv, SEED.path.csv and SEED.truth.json of each trial there\n",
+      {"workpiece", "count", "seed", "threads", "job", "cell", "edges"}, {"json", "weld", "each"});
   if (line.exit_code()) return *line.exit_code();
   if (!line.has("workpiece")) return line.refuse("trials wants --workpiece");
-  const auto count = line.number("count", 150), seed = line.number("seed", 1), threads = line.number("threads", 2);
+  const auto count = line.number("count", 150), seed = line.number("seed", 1),
+             threads = line.number("threads", 2);
   if (!count || !seed || !threads) return 2;
   if (*count < 1 || *threads < 1) return line.refuse("--count and --threads want at least 1");
 
@@ -121,7 +128,8 @@ int command_trials(Arguments arguments) {
   trials.scene_file = name.find('.') == std::string::npos ? shared_file("scenes/" + name + ".yaml") : name;
   const std::string cell_file = line.value("cell", shared_file("cell-demo.yaml"));
   const std::string job_file = line.value("job", shared_file("jobs/demo-" + name + ".yaml"));
-  if (trials.scene_file.empty()) return line.refuse("no scene for workpiece '" + name + "' under config/scenes");
+  if (trials.scene_file.empty())
+    return line.refuse("no scene for workpiece '" + name + "' under config/scenes");
 
   auto cell = files::read_cell_file(cell_file);
   if (const auto* faults = std::get_if<files::Faults>(&cell)) return line.refuse(files::text(*faults));
@@ -141,7 +149,8 @@ int command_trials(Arguments arguments) {
   const std::vector<VirtualOutcome> outcomes = run(trials, std::get<sim::Scene>(first));
 
   if (line.has("edges")) {
-    if (const Status kept = keep_edges(line.value("edges"), trials.seed, outcomes); !kept.ok()) return line.refuse(kept.error().text());
+    if (const Status kept = keep_edges(line.value("edges"), trials.seed, outcomes); !kept.ok())
+      return line.refuse(kept.error().text());
   }
   std::vector<double> x, y, theta, seams;
   int failures = 0;
@@ -149,9 +158,10 @@ int command_trials(Arguments arguments) {
   for (std::size_t i = 0; i < outcomes.size(); ++i) {
     const VirtualOutcome& o = outcomes[i];
     if (line.has("each")) {
-      std::fprintf(stderr, "%4zu %-7s dx %+.3f dy %+.3f mm dtheta %+.4f deg  %d points, %d passes, scan %.1f s  %s\n", i + trials.seed,
-                   o.verdict.c_str(), o.centroid_error_mm.x(), o.centroid_error_mm.y(), deg(o.theta_error_rad), o.points, o.passes,
-                   o.scan_s, o.accepted ? "" : o.reason.c_str());
+      std::fprintf(stderr,
+                   "%4zu %-7s dx %+.3f dy %+.3f mm dtheta %+.4f deg  %d points, %d passes, scan %.1f s  %s\n",
+                   i + trials.seed, o.verdict.c_str(), o.centroid_error_mm.x(), o.centroid_error_mm.y(),
+                   deg(o.theta_error_rad), o.points, o.passes, o.scan_s, o.accepted ? "" : o.reason.c_str());
       if (!o.accepted) {
         for (const std::string& event : o.log) std::fprintf(stderr, "       %s\n", event.c_str());
       }
@@ -178,16 +188,22 @@ int command_trials(Arguments arguments) {
              {"y_mm", spread_json(sy)},
              {"theta_deg", spread_json(st)},
              {"scan_seconds_mean", scan_s},
-             {"paper", {{"x_mm_std", kPaperX}, {"y_mm_std", kPaperY}, {"theta_deg_std", kPaperTheta}, {"failure_share_below", kPaperFailures}}}};
+             {"paper",
+              {{"x_mm_std", kPaperX},
+               {"y_mm_std", kPaperY},
+               {"theta_deg_std", kPaperTheta},
+               {"failure_share_below", kPaperFailures}}}};
     if (!seams.empty()) out["seam_mm"] = spread_json(ss);
     std::printf("%s\n", out.dump().c_str());
   } else {
-    std::printf("%d trials of %s, seed %llu, virtual time\n\n", trials.count, name.c_str(), static_cast<unsigned long long>(trials.seed));
+    std::printf("%d trials of %s, seed %llu, virtual time\n\n", trials.count, name.c_str(),
+                static_cast<unsigned long long>(trials.seed));
     std::printf("%-22s %10s %10s %10s %10s\n", "", "std", "rms", "worst", "paper std");
     std::printf("%-22s %10.4f %10.4f %10.4f %10.2f\n", "X, mm", sx.std, sx.rms, sx.worst, kPaperX);
     std::printf("%-22s %10.4f %10.4f %10.4f %10.2f\n", "Y, mm", sy.std, sy.rms, sy.worst, kPaperY);
     std::printf("%-22s %10.4f %10.4f %10.4f %10.2f\n", "theta, deg", st.std, st.rms, st.worst, kPaperTheta);
-    if (!seams.empty()) std::printf("%-22s %10.4f %10.4f %10.4f %10s\n", "torch on seam, mm", ss.std, ss.rms, ss.worst, "-");
+    if (!seams.empty())
+      std::printf("%-22s %10.4f %10.4f %10.4f %10s\n", "torch on seam, mm", ss.std, ss.rms, ss.worst, "-");
     std::printf("%-22s %9.1f%% %32s\n", "failures", 100 * share, "below 13%");
     std::printf("%-22s %10.1f s\n", "mean scan time", scan_s);
   }

@@ -14,33 +14,36 @@ std::string status_json(const Wiring& wiring) {
   const job::CellStatus s = wiring.status();
   json links;
   for (std::size_t i = 0; i < job::kLinks; ++i) links[job::to_string(static_cast<job::Link>(i))] = s.links[i];
-  return json{{"ok", true},
-              {"state", job::to_string(s.state)},
-              {"phase", static_cast<int>(s.state)},
-              {"armed", s.armed},
-              {"job", s.job},
-              {"guide_step", s.guide_step},
-              {"guide_steps", s.guide_steps},
-              {"progress", s.progress},
-              {"pass", s.pass},
-              {"seams_done", s.seams_done},
-              {"seams", s.seams},
-              {"fault", s.fault_text},
-              {"fault_code", static_cast<int>(s.fault)},
-              {"links", links},
-              {"ports", {{"egm", wiring.egm_port.load()}, {"modbus", wiring.modbus_port.load()}}},
-              {"rss_kb", adapters::rss_kb()},
-              {"cpu_seconds", adapters::cpu_seconds()},
-              {"threads", adapters::thread_count()},
-              {"dropped", {{"egm", wiring.egm.dropped()}, {"laser", wiring.laser.dropped()}, {"inbox", wiring.inbox.refused()}}}}
+  return json{
+      {"ok", true},
+      {"state", job::to_string(s.state)},
+      {"phase", static_cast<int>(s.state)},
+      {"armed", s.armed},
+      {"job", s.job},
+      {"guide_step", s.guide_step},
+      {"guide_steps", s.guide_steps},
+      {"progress", s.progress},
+      {"pass", s.pass},
+      {"seams_done", s.seams_done},
+      {"seams", s.seams},
+      {"fault", s.fault_text},
+      {"fault_code", static_cast<int>(s.fault)},
+      {"links", links},
+      {"ports", {{"egm", wiring.egm_port.load()}, {"modbus", wiring.modbus_port.load()}}},
+      {"rss_kb", adapters::rss_kb()},
+      {"cpu_seconds", adapters::cpu_seconds()},
+      {"threads", adapters::thread_count()},
+      {"dropped",
+       {{"egm", wiring.egm.dropped()}, {"laser", wiring.laser.dropped()}, {"inbox", wiring.inbox.refused()}}}}
       .dump();
 }
 
 std::optional<wire::PlcCommand> order_of(const std::string& word) {
   using wire::PlcCommand;
   static const std::pair<const char*, PlcCommand> kOrders[] = {
-      {"arm", PlcCommand::Arm},       {"start", PlcCommand::Start}, {"confirm", PlcCommand::Confirm}, {"stop", PlcCommand::Stop},
-      {"resume", PlcCommand::Resume}, {"reset", PlcCommand::Reset}, {"abort", PlcCommand::Abort}};
+      {"arm", PlcCommand::Arm},    {"start", PlcCommand::Start},   {"confirm", PlcCommand::Confirm},
+      {"stop", PlcCommand::Stop},  {"resume", PlcCommand::Resume}, {"reset", PlcCommand::Reset},
+      {"abort", PlcCommand::Abort}};
   for (const auto& [name, order] : kOrders) {
     if (word == name) return order;
   }
@@ -67,8 +70,9 @@ std::string answer(Wiring& wiring, const adapters::ControlRequest& request) {
 }  // namespace
 
 Result<adapters::ControlSocket> open_control(Wiring& wiring) {
-  return adapters::ControlSocket::listen(wiring.config.state_dir + "/weldcelld.sock",
-                                         [&wiring](const adapters::ControlRequest& request) { return answer(wiring, request); });
+  return adapters::ControlSocket::listen(
+      wiring.config.state_dir + "/weldcelld.sock",
+      [&wiring](const adapters::ControlRequest& request) { return answer(wiring, request); });
 }
 
 }  // namespace weldcell::app

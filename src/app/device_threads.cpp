@@ -24,7 +24,8 @@ constexpr Nanoseconds kPoll = 100 * kMillisecond;
 bool stopping(const Wiring& wiring) { return wiring.stopping.load(std::memory_order_relaxed); }
 
 void report_link(Wiring& wiring, job::Link link, bool up, const std::string& detail) {
-  // The cell must not miss a link: when its inbox is full, it is asked again at the next change of the device.
+  // The cell must not miss a link: when its inbox is full, it is asked again at the next change of the
+  // device.
   wiring.inbox.push({job::LinkChange{link, up, detail}, nullptr, nullptr});
 }
 
@@ -111,7 +112,8 @@ void run_rws(Wiring& wiring, const std::string& password, const std::string& res
       const auto state = rws.controller_state();
       if (link != state.ok()) {
         link = state.ok();
-        report_link(wiring, job::Link::Rws, *link, state.ok() ? adapters::to_string(*state) : state.error().text());
+        report_link(wiring, job::Link::Rws, *link,
+                    state.ok() ? adapters::to_string(*state) : state.error().text());
       }
     }
   }
@@ -135,7 +137,8 @@ void run_plc(Wiring& wiring, adapters::ModbusServer& server) {
         link = true;
         report_link(wiring, job::Link::Plc, true, "heartbeat");
       }
-      if (!told_order || order.command_sequence != last.command_sequence || order.job_number != last.job_number) {
+      if (!told_order || order.command_sequence != last.command_sequence ||
+          order.job_number != last.job_number) {
         wiring.inbox.push({job::PlcInput{order}, nullptr, nullptr});
       }
       last = order;

@@ -1,4 +1,5 @@
-// The bodies of the daemon's device threads; each owns one adapter and speaks to the others through the wiring only.
+// The bodies of the daemon's device threads; each owns one adapter and speaks to the others through the
+// wiring only.
 #pragma once
 
 #include <string>

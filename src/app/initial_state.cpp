@@ -5,9 +5,12 @@
 namespace weldcell::app {
 
 std::string memory_json(const job::CellMemory& m) {
-  return nlohmann::json{{"state", static_cast<int>(m.state)},     {"armed", m.armed},
-                        {"links", m.links},                       {"next_request", m.next_request},
-                        {"last_sequence", m.last_sequence},       {"sequence_known", m.sequence_known}}
+  return nlohmann::json{{"state", static_cast<int>(m.state)},
+                        {"armed", m.armed},
+                        {"links", m.links},
+                        {"next_request", m.next_request},
+                        {"last_sequence", m.last_sequence},
+                        {"sequence_known", m.sequence_known}}
       .dump();
 }
 

@@ -19,7 +19,8 @@ namespace {
 
 bool is_cad(const fs::path& path) {
   std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
   return extension == ".step" || extension == ".stp" || extension == ".dxf";
 }
 
@@ -45,7 +46,8 @@ Result<workpiece::Workpiece> load_workpiece(const job::JobOrder& order, const st
     const auto revision = file_revision(path.string());
     if (!revision.ok()) return revision.error();
     if (*revision != order.revision) {
-      return Error{"workpiece.revision", path.string(), "its revision is " + *revision + ", the job wants " + order.revision,
+      return Error{"workpiece.revision", path.string(),
+                   "its revision is " + *revision + ", the job wants " + order.revision,
                    "send the right file, or correct 'revision'"};
     }
   }

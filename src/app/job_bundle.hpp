@@ -15,7 +15,8 @@ struct JobBundle {
   std::string job_text, workpiece_yaml;
 };
 
-/// The workpiece that `order` names, beside the job file in `folder`; revision checked. The error names file, cause, mend.
+/// The workpiece that `order` names, beside the job file in `folder`; revision checked. The error names file,
+/// cause, mend.
 Result<workpiece::Workpiece> load_workpiece(const job::JobOrder& order, const std::string& folder,
                                             const std::string& cad_cache_dir);
 

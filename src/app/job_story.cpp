@@ -32,7 +32,8 @@ void JobStory::note(HostTime time, const job::Outputs& outputs) {
 }
 
 review::ReportInput JobStory::report(const job::Cell& cell, const cell::CellSetup& setup,
-                                     const std::string& program_version, const std::string& accepted_at) const {
+                                     const std::string& program_version,
+                                     const std::string& accepted_at) const {
   review::ReportInput input;
   input.program_version = program_version;
   input.accepted_at = accepted_at;
@@ -67,14 +68,16 @@ review::ReportInput JobStory::report(const job::Cell& cell, const cell::CellSetu
         {"readings lost", std::to_string(align.lost), ""},
         {"laser clock against host", fmt::format("{:.1f}", align.laser_skew_ppm), "ppm"},
         {"robot clock against host", fmt::format("{:.1f}", align.robot_skew_ppm), "ppm"},
-        {"residual latency", solution->found.latency_s ? fmt::format("{:.2f}", *solution->found.latency_s * 1e3) : "-", "ms"},
+        {"residual latency",
+         solution->found.latency_s ? fmt::format("{:.2f}", *solution->found.latency_s * 1e3) : "-", "ms"},
     };
   }
   input.figures.push_back({"scanning", fmt::format("{:.1f}", scan_s_), "s"});
   input.events = events_;
   for (std::size_t i = 0; i < drawings_.size(); ++i) {
     const bool titled = cell.prepared() && i < cell.prepared()->steps.size();
-    input.guidance.push_back({titled ? cell.prepared()->steps[i].title : "step " + std::to_string(i + 1), *drawings_[i]});
+    input.guidance.push_back(
+        {titled ? cell.prepared()->steps[i].title : "step " + std::to_string(i + 1), *drawings_[i]});
   }
   return input;
 }
@@ -92,9 +95,12 @@ std::string JobStory::result_json(const job::Cell& cell) const {
   out["seams_done"] = cell.status().seams_done;
   if (const auto solution = cell.solution()) {
     const auto& found = solution->found;
-    out["found"] = {{"x_mm", found.pose.x_mm}, {"y_mm", found.pose.y_mm}, {"theta_deg", deg(found.pose.theta_rad)}};
-    const auto offset = localize::offset_from_planned(cell.prepared()->outline, cell.prepared()->planned, found.pose);
-    out["offset"] = {{"dx_mm", offset.dx_mm}, {"dy_mm", offset.dy_mm}, {"dtheta_deg", deg(offset.dtheta_rad)}};
+    out["found"] = {
+        {"x_mm", found.pose.x_mm}, {"y_mm", found.pose.y_mm}, {"theta_deg", deg(found.pose.theta_rad)}};
+    const auto offset =
+        localize::offset_from_planned(cell.prepared()->outline, cell.prepared()->planned, found.pose);
+    out["offset"] = {
+        {"dx_mm", offset.dx_mm}, {"dy_mm", offset.dy_mm}, {"dtheta_deg", deg(offset.dtheta_rad)}};
     out["cause"] = found.cause;
     out["points"] = found.points;
     out["inliers"] = found.inliers;

@@ -1,4 +1,5 @@
-// A bounded queue between ordinary threads. Full means that somebody is stuck: push says so and counts, the caller acts.
+// A bounded queue between ordinary threads. Full means that somebody is stuck: push says so and counts, the
+// caller acts.
 #pragma once
 
 #include <chrono>

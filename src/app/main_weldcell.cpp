@@ -16,7 +16,8 @@ struct Command {
 };
 
 constexpr Command kCommands[] = {
-    {"check", weldcell::app::command_check, "check cell, workpiece and job files: every fault with line and mend"},
+    {"check", weldcell::app::command_check,
+     "check cell, workpiece and job files: every fault with line and mend"},
     {"import", weldcell::app::command_import, "STEP or DXF -> workpiece.yaml"},
     {"plan", weldcell::app::command_plan, "what a job would do: guidance, scan, reach, times; no motion"},
     {"localize", weldcell::app::command_localize, "edge points -> pose, covariance, verdict"},
@@ -35,7 +36,8 @@ constexpr Command kCommands[] = {
 int usage(std::FILE* to) {
   std::fputs("usage: weldcell COMMAND [ARGUMENT...]     weldcell COMMAND --help\n\n", to);
   for (const Command& command : kCommands) std::fprintf(to, "  %-10s %s\n", command.name, command.line);
-  std::fputs("\nexit codes: 0 done, 1 done but not accepted, 2 bad input or usage, 3 device or system fault\n", to);
+  std::fputs(
+      "\nexit codes: 0 done, 1 done but not accepted, 2 bad input or usage, 3 device or system fault\n", to);
   return to == stdout ? 0 : 2;
 }
 
@@ -43,7 +45,8 @@ int usage(std::FILE* to) {
 
 int main(int argc, char** argv) {
   if (argc < 2) return usage(stderr);
-  if (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0 || std::strcmp(argv[1], "help") == 0) {
+  if (std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0 ||
+      std::strcmp(argv[1], "help") == 0) {
     return usage(stdout);
   }
   if (std::strcmp(argv[1], "--version") == 0) {
@@ -53,7 +56,8 @@ int main(int argc, char** argv) {
   try {
     for (const Command& command : kCommands) {
       if (std::strcmp(argv[1], command.name) == 0) {
-        return command.run(Arguments(const_cast<const char* const*>(argv) + 2, static_cast<std::size_t>(argc - 2)));
+        return command.run(
+            Arguments(const_cast<const char* const*>(argv) + 2, static_cast<std::size_t>(argc - 2)));
       }
     }
   } catch (const std::exception& fault) {

@@ -1,5 +1,5 @@
-// weldcelld: the cell controller daemon. Reads its configuration, makes the threads, keeps spool and control socket, and
-// stops in order.
+// weldcelld: the cell controller daemon. Reads its configuration, makes the threads, keeps spool and control
+// socket, and stops in order.
 #include <malloc.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -31,7 +31,8 @@ volatile std::sig_atomic_t g_signal = 0;
 constexpr const char* kUsage =
     "usage: weldcelld --config cell.yaml [--check] [--ports-file FILE]\n"
     "       weldcelld --print-states\n"
-    "The weld cell controller. --check validates the configuration and exits; --print-states prints the job's state\n"
+    "The weld cell controller. --check validates the configuration and exits; --print-states prints the "
+    "job's state\n"
     "machine as a Graphviz graph; --ports-file tells the ports that were taken, as JSON.\n";
 
 int refuse(const std::string& text) {
@@ -42,27 +43,32 @@ int refuse(const std::string& text) {
 /// The controller's password: credential, file, or none.
 Result<std::string> password_of(const files::CellConfig& config) {
   auto credential = adapters::credential("rws-password");
-  if (credential.ok() || config.rws_password_file.empty()) return credential.ok() ? credential : Result<std::string>(std::string{});
+  if (credential.ok() || config.rws_password_file.empty())
+    return credential.ok() ? credential : Result<std::string>(std::string{});
   return adapters::secret_file(config.rws_password_file);
 }
 
-/// Text of the arm's data file beside the cell file, for the record; empty when the cell file holds the arm itself.
+/// Text of the arm's data file beside the cell file, for the record; empty when the cell file holds the arm
+/// itself.
 std::string arm_text(const files::CellConfig& config) {
-  const auto folder = std::filesystem::absolute(config.path).parent_path() / "robots" / (config.setup.arm.name + ".yaml");
+  const auto folder =
+      std::filesystem::absolute(config.path).parent_path() / "robots" / (config.setup.arm.name + ".yaml");
   const auto text = read_file(folder.string());
   return text.ok() ? *text : std::string{};
 }
 
 Status write_ports(const std::string& path, const Wiring& wiring) {
   if (path.empty()) return Done{};
-  return write_file_durably(path, fmt::format("{{\"egm\": {}, \"modbus\": {}}}\n", wiring.egm_port.load(), wiring.modbus_port.load()));
+  return write_file_durably(path, fmt::format("{{\"egm\": {}, \"modbus\": {}}}\n", wiring.egm_port.load(),
+                                              wiring.modbus_port.load()));
 }
 
 /// Asks for a controlled stop when something moves, and waits until it rests.
 void come_to_rest(Wiring& wiring, const SpoolKeeper&) {
   if (!job::under_way(wiring.status().state)) return;
   wiring.inbox.push({job::OperatorCommand{wire::PlcCommand::Stop, "daemon's end"}, nullptr, nullptr});
-  for (int i = 0; i < 30 && job::under_way(wiring.status().state); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  for (int i = 0; i < 30 && job::under_way(wiring.status().state); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
   std::this_thread::sleep_for(std::chrono::milliseconds(700));  // the ramp to rest, and RAPID's stop over RWS
 }
 
@@ -96,8 +102,9 @@ int serve(const files::CellConfig& config, const std::string& ports_file) {
   if (!threads.ok()) return refuse(threads.error().text());
 
   SpoolKeeper keeper(*wiring, std::move(*spool));
-  spdlog::info("weldcelld {} serves cell '{}': EGM {}:{}, Modbus {}:{}, spool {}", WELDCELL_VERSION, config.setup.name,
-               config.egm.host, wiring->egm_port.load(), config.modbus.host, wiring->modbus_port.load(), config.spool_dir);
+  spdlog::info("weldcelld {} serves cell '{}': EGM {}:{}, Modbus {}:{}, spool {}", WELDCELL_VERSION,
+               config.setup.name, config.egm.host, wiring->egm_port.load(), config.modbus.host,
+               wiring->modbus_port.load(), config.spool_dir);
   adapters::notify_ready("waiting for a job");
   Watchdog watchdog;
   while (g_signal == 0) {
@@ -152,8 +159,8 @@ int main(int argc, char** argv) {
   sigaction(SIGINT, &action, nullptr);
   signal(SIGPIPE, SIG_IGN);
   try {
-    return weldcell::app::weldcelld(
-        weldcell::app::Arguments(const_cast<const char* const*>(argv) + 1, static_cast<std::size_t>(argc - 1)));
+    return weldcell::app::weldcelld(weldcell::app::Arguments(const_cast<const char* const*>(argv) + 1,
+                                                             static_cast<std::size_t>(argc - 1)));
   } catch (const std::exception& fault) {
     std::fprintf(stderr, "weldcelld: %s\n", fault.what());
     return 3;

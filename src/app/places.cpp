@@ -23,7 +23,8 @@ std::string cad_program() { return program_dir() + "/weldcell-cad"; }
 
 std::string shared_file(const std::string& relative) {
   const fs::path bin = program_dir();
-  for (const fs::path& root : {bin / "../../../config", bin / "../share/weldcell", fs::path("/usr/share/weldcell")}) {
+  for (const fs::path& root :
+       {bin / "../../../config", bin / "../share/weldcell", fs::path("/usr/share/weldcell")}) {
     std::error_code error;
     const fs::path candidate = root / relative;
     if (fs::exists(candidate, error)) return fs::weakly_canonical(candidate, error).string();
@@ -43,7 +44,8 @@ Result<std::string> read_file(const std::string& path) {
 Status write_file_durably(const std::string& path, const std::string& text) {
   const std::string draft = path + ".tmp";
   const auto failed = [&](const char* what) {
-    return Error{"file.write", path, std::string(what) + ": " + std::strerror(errno), "check space and permissions"};
+    return Error{"file.write", path, std::string(what) + ": " + std::strerror(errno),
+                 "check space and permissions"};
   };
   const int fd = ::open(draft.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640);
   if (fd < 0) return failed("cannot be opened");

@@ -1,4 +1,5 @@
-// Where the program's own files lie: beside the executable in a build or source tree, or installed under /usr/share.
+// Where the program's own files lie: beside the executable in a build or source tree, or installed under
+// /usr/share.
 #pragma once
 
 #include <optional>
@@ -12,7 +13,8 @@ namespace weldcell::app {
 std::string program_dir();
 /// weldcell-cad beside this program.
 std::string cad_program();
-/// A file below config/: from the source tree that this build came from, else from the installed share. Empty when absent.
+/// A file below config/: from the source tree that this build came from, else from the installed share. Empty
+/// when absent.
 std::string shared_file(const std::string& relative);
 Result<std::string> read_file(const std::string& path);
 /// Writes beside the path, syncs and renames, so that the file is never half.

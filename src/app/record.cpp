@@ -28,8 +28,15 @@ std::string as_text(const wire::Bytes& bytes) {
 }
 
 json report_json(const robot::EgmReport& r) {
-  return {static_cast<int>(r.phase), static_cast<int>(r.refusal), r.plan_id, r.plan_time_s, r.plan_done,
-          r.session, r.limited, r.malformed, r.stale};
+  return {static_cast<int>(r.phase),
+          static_cast<int>(r.refusal),
+          r.plan_id,
+          r.plan_time_s,
+          r.plan_done,
+          r.session,
+          r.limited,
+          r.malformed,
+          r.stale};
 }
 
 robot::EgmReport report_from(const json& j) {
@@ -52,31 +59,44 @@ std::pair<std::string, json> small_input(const job::InputBody& body) {
   using Named = std::pair<std::string, json>;
   return std::visit(
       Overloaded{
-          [](const Tick&) -> Named { return {"/cell/tick", json::object()}; },
+          [](const Tick&) -> Named {
+            return {"/cell/tick", json::object()};
+          },
           [](const LinkChange& l) -> Named {
             return {"/cell/link", {{"link", static_cast<int>(l.link)}, {"up", l.up}, {"detail", l.detail}}};
           },
           [](const PlcInput& p) -> Named {
-            return {"/plc/order", {{"heartbeat", p.order.heartbeat},
-                                   {"sequence", p.order.command_sequence},
-                                   {"command", static_cast<int>(p.order.command)},
-                                   {"job_number", p.order.job_number}}};
+            return {"/plc/order",
+                    {{"heartbeat", p.order.heartbeat},
+                     {"sequence", p.order.command_sequence},
+                     {"command", static_cast<int>(p.order.command)},
+                     {"job_number", p.order.job_number}}};
           },
           [](const OperatorCommand& o) -> Named {
             return {"/operator/command", {{"command", static_cast<int>(o.command)}, {"who", o.who}}};
           },
           [](const JobArrived& a) -> Named {
-            return {"/job/arrived", {{"id", a.id},
-                                     {"number", a.number},
-                                     {"interrupted", a.interrupted},
-                                     {"seams_done", a.seams_done},
-                                     {"guidance_done", a.guidance_done}}};
+            return {"/job/arrived",
+                    {{"id", a.id},
+                     {"number", a.number},
+                     {"interrupted", a.interrupted},
+                     {"seams_done", a.seams_done},
+                     {"guidance_done", a.guidance_done}}};
           },
           [](const RobotReply& r) -> Named {
-            return {"/robot/reply", {{"id", r.id}, {"ok", r.ok}, {"text", r.text}, {"running", r.running}, {"seams_done", r.seams_done}}};
+            return {"/robot/reply",
+                    {{"id", r.id},
+                     {"ok", r.ok},
+                     {"text", r.text},
+                     {"running", r.running},
+                     {"seams_done", r.seams_done}}};
           },
-          [](const Overrun& o) -> Named { return {"/cell/overrun", {{"link", static_cast<int>(o.link)}, {"lost", o.lost}}}; },
-          [](const auto&) -> Named { return {"", {}}; },
+          [](const Overrun& o) -> Named {
+            return {"/cell/overrun", {{"link", static_cast<int>(o.link)}, {"lost", o.lost}}};
+          },
+          [](const auto&) -> Named {
+            return {"", {}};
+          },
       },
       body);
 }
@@ -84,7 +104,8 @@ std::pair<std::string, json> small_input(const job::InputBody& body) {
 std::optional<job::InputBody> small_input_from(const std::string& topic, const json& j) {
   using namespace job;
   if (topic == "/cell/tick") return Tick{};
-  if (topic == "/cell/link") return LinkChange{static_cast<Link>(j.at("link").get<int>()), j.at("up"), j.at("detail")};
+  if (topic == "/cell/link")
+    return LinkChange{static_cast<Link>(j.at("link").get<int>()), j.at("up"), j.at("detail")};
   if (topic == "/plc/order") {
     wire::PlcOrder order;
     order.heartbeat = j.at("heartbeat");
@@ -105,7 +126,8 @@ std::optional<job::InputBody> small_input_from(const std::string& topic, const j
     arrived.guidance_done = j.at("guidance_done");
     return arrived;
   }
-  if (topic == "/robot/reply") return RobotReply{j.at("id"), j.at("ok"), j.at("text"), j.at("running"), j.at("seams_done")};
+  if (topic == "/robot/reply")
+    return RobotReply{j.at("id"), j.at("ok"), j.at("text"), j.at("running"), j.at("seams_done")};
   if (topic == "/cell/overrun") return Overrun{static_cast<Link>(j.at("link").get<int>()), j.at("lost")};
   return std::nullopt;
 }
@@ -143,7 +165,8 @@ class StepReader {
       step.input.body = std::move(*body);
     } else {
       record.damage.push_back({"record.topic", "byte " + std::to_string(message.file_offset),
-                               "unknown topic '" + message.topic + "'", "read it with the program version that wrote it"});
+                               "unknown topic '" + message.topic + "'",
+                               "read it with the program version that wrote it"});
       return;
     }
     record.steps.push_back(std::move(step));
@@ -220,14 +243,15 @@ Result<Record> read_record(std::span<const std::byte> file) {
     const auto it = record.attachments.find(name);
     return it == record.attachments.end() ? std::string{} : it->second;
   };
-  record.header = {text("program"), text("cell.yaml"), text("job.yaml"), text("workpiece.yaml"), text("arm.yaml"),
-                   text("initial.json")};
+  record.header = {text("program"),        text("cell.yaml"), text("job.yaml"),
+                   text("workpiece.yaml"), text("arm.yaml"),  text("initial.json")};
   StepReader reader;
   for (const auto& message : mcap->messages) {
     try {
       reader.add(message, record);
     } catch (const json::exception& fault) {
-      record.damage.push_back({"record.message", "byte " + std::to_string(message.file_offset) + " (" + message.topic + ")",
+      record.damage.push_back({"record.message",
+                               "byte " + std::to_string(message.file_offset) + " (" + message.topic + ")",
                                fault.what(), "the record is damaged here"});
     }
   }

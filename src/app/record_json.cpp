@@ -41,7 +41,8 @@ json pose_json(const Pose2& pose) { return {pose.x_mm, pose.y_mm, pose.theta_rad
 
 json solution_json(const job::Solution& solution) {
   json edges = json::array();
-  for (const EdgePoint& e : solution.evidence.edges) edges.push_back({e.x_mm, e.y_mm, e.dir_x, e.dir_y, e.step, e.sigma_mm});
+  for (const EdgePoint& e : solution.evidence.edges)
+    edges.push_back({e.x_mm, e.y_mm, e.dir_x, e.dir_y, e.step, e.sigma_mm});
   json welds = json::array();
   for (const auto& c : solution.certificates) {
     welds.push_back({{"name", c.name},
@@ -78,48 +79,66 @@ json failed(const Result<T>& result) {
 
 std::string output_json(const job::Output& output) {
   using namespace job;
-  return std::visit(
-             Overloaded{
-                 [](const RobotRequest& r) -> json {
-                   return {{"output", "robot"},       {"id", r.id},
-                           {"task", to_string(r.task)}, {"joints_rad", joints_json(r.joints)},
-                           {"skip_seams", r.skip_seams}, {"module_digest", text_digest(r.module_text)}};
-                 },
-                 [](const ImportRequest&) -> json { return {{"output", "import"}}; },
-                 [](const PlanRequest&) -> json { return {{"output", "plan"}}; },
-                 [](const PassRequest&) -> json { return {{"output", "plan_pass"}}; },
-                 [](const SolveRequest& r) -> json {
-                   return {{"output", "solve"}, {"readings", r.scan->readings.size()}, {"frames", r.scan->feedback.size()}};
-                 },
-                 [](const StartMotion& m) -> json {
-                   return {{"output", "motion"}, {"plan", m.plan->id}, {"digest", digest(*m.plan)}};
-                 },
-                 [](const StopMotion&) -> json { return {{"output", "stop_motion"}}; },
-                 [](const SetArmed& a) -> json { return {{"output", "armed"}, {"armed", a.armed}}; },
-                 [](const ShowDrawing& d) -> json {
-                   return {{"output", "drawing"}, {"step", d.step}, {"drawing", d.drawing ? drawing_json(*d.drawing) : json()}};
-                 },
-                 [](const SaveState& s) -> json {
-                   return {{"output", "state"},
-                           {"state", to_string(s.state)},
-                           {"seams_done", s.seams_done},
-                           {"guidance_done", s.guidance_done}};
-                 },
-                 [](const FinishJob& f) -> json {
-                   return {{"output", "finish"}, {"accepted", f.accepted}, {"verdict", f.verdict}, {"reason", f.reason}};
-                 },
-                 [](const LogEvent& e) -> json {
-                   return {{"output", "log"}, {"level", static_cast<int>(e.level)}, {"text", e.text}};
-                 },
-             },
-             output)
+  return std::visit(Overloaded{
+                        [](const RobotRequest& r) -> json {
+                          return {
+                              {"output", "robot"},          {"id", r.id},
+                              {"task", to_string(r.task)},  {"joints_rad", joints_json(r.joints)},
+                              {"skip_seams", r.skip_seams}, {"module_digest", text_digest(r.module_text)}};
+                        },
+                        [](const ImportRequest&) -> json {
+                          return {{"output", "import"}};
+                        },
+                        [](const PlanRequest&) -> json {
+                          return {{"output", "plan"}};
+                        },
+                        [](const PassRequest&) -> json {
+                          return {{"output", "plan_pass"}};
+                        },
+                        [](const SolveRequest& r) -> json {
+                          return {{"output", "solve"},
+                                  {"readings", r.scan->readings.size()},
+                                  {"frames", r.scan->feedback.size()}};
+                        },
+                        [](const StartMotion& m) -> json {
+                          return {{"output", "motion"}, {"plan", m.plan->id}, {"digest", digest(*m.plan)}};
+                        },
+                        [](const StopMotion&) -> json {
+                          return {{"output", "stop_motion"}};
+                        },
+                        [](const SetArmed& a) -> json {
+                          return {{"output", "armed"}, {"armed", a.armed}};
+                        },
+                        [](const ShowDrawing& d) -> json {
+                          return {{"output", "drawing"},
+                                  {"step", d.step},
+                                  {"drawing", d.drawing ? drawing_json(*d.drawing) : json()}};
+                        },
+                        [](const SaveState& s) -> json {
+                          return {{"output", "state"},
+                                  {"state", to_string(s.state)},
+                                  {"seams_done", s.seams_done},
+                                  {"guidance_done", s.guidance_done}};
+                        },
+                        [](const FinishJob& f) -> json {
+                          return {{"output", "finish"},
+                                  {"accepted", f.accepted},
+                                  {"verdict", f.verdict},
+                                  {"reason", f.reason}};
+                        },
+                        [](const LogEvent& e) -> json {
+                          return {{"output", "log"}, {"level", static_cast<int>(e.level)}, {"text", e.text}};
+                        },
+                    },
+                    output)
       .dump();
 }
 
 std::optional<WorkMark> work_mark(const job::InputBody& body) {
   using namespace job;
   if (const auto* done = std::get_if<ImportDone>(&body)) {
-    const json mark = done->workpiece.ok() ? json{{"ok", true}, {"name", done->workpiece->name}} : failed(done->workpiece);
+    const json mark =
+        done->workpiece.ok() ? json{{"ok", true}, {"name", done->workpiece->name}} : failed(done->workpiece);
     return WorkMark{"/work/import", mark.dump()};
   }
   if (const auto* done = std::get_if<PlanDone>(&body)) {
@@ -136,7 +155,8 @@ std::optional<WorkMark> work_mark(const job::InputBody& body) {
     if (!done->pass.ok()) return WorkMark{"/work/pass", failed(done->pass).dump()};
     return WorkMark{"/work/pass", json{{"ok", true}, {"digest", digest(*(*done->pass)->scan)}}.dump()};
   }
-  if (const auto* done = std::get_if<SolveDone>(&body)) return WorkMark{"/work/solve", solution_json(*done->solution).dump()};
+  if (const auto* done = std::get_if<SolveDone>(&body))
+    return WorkMark{"/work/solve", solution_json(*done->solution).dump()};
   return std::nullopt;
 }
 

@@ -37,7 +37,8 @@ Result<std::string> changed(const std::string& yaml, const std::vector<Change>& 
     }
     return YAML::Dump(top);
   } catch (const YAML::Exception& fault) {
-    return Error{"replay.set", "--set", fault.what(), "use KEY=VALUE with a dotted key of the cell or, as job.KEY, the job file"};
+    return Error{"replay.set", "--set", fault.what(),
+                 "use KEY=VALUE with a dotted key of the cell or, as job.KEY, the job file"};
   }
 }
 
@@ -71,7 +72,8 @@ struct Context {
 
 template <typename T>
 Result<T> parsed(std::variant<T, files::Faults> read) {
-  if (const auto* faults = std::get_if<files::Faults>(&read)) return Error{"replay.header", "", files::text(*faults), ""};
+  if (const auto* faults = std::get_if<files::Faults>(&read))
+    return Error{"replay.header", "", files::text(*faults), ""};
   return std::get<T>(std::move(read));
 }
 
@@ -95,7 +97,8 @@ Result<Context> context_of(const Record& record, const std::vector<Change>& chan
   if (!order.ok()) return order.error();
   Context context{*config, *order, std::nullopt};
   if (!record.header.workpiece_yaml.empty()) {
-    auto workpiece = parsed(files::parse_workpiece(record.header.workpiece_yaml, "workpiece.yaml in the record"));
+    auto workpiece =
+        parsed(files::parse_workpiece(record.header.workpiece_yaml, "workpiece.yaml in the record"));
     if (!workpiece.ok()) return workpiece.error();
     context.workpiece = *workpiece;
   }
@@ -111,7 +114,8 @@ class Replayer {
         setup_(std::make_shared<const cell::CellSetup>(context.config.setup)) {
     outcome_.setup = context.config.setup;
     outcome_.laser_layout = context.config.laser_layout;
-    outcome_.cell = std::make_unique<job::Cell>(context.config.setup, context.config.laser_layout, context.config.plc_required);
+    outcome_.cell = std::make_unique<job::Cell>(context.config.setup, context.config.laser_layout,
+                                                context.config.plc_required);
     outcome_.cell->recall(memory_from_json(record.header.initial_json));
   }
 
@@ -132,7 +136,8 @@ class Replayer {
     if (step.mark) {
       auto answer = take_answer(*step.mark);
       if (!answer) {
-        differ(step, "the record has an answer " + step.mark->topic + " that this run did not ask for", "", "");
+        differ(step, "the record has an answer " + step.mark->topic + " that this run did not ask for", "",
+               "");
         return;
       }
       input.body = std::move(*answer);
@@ -183,12 +188,16 @@ class Replayer {
     }
   }
 
-  void differ(const RecordedStep& step, const std::string& what, const std::string& then, const std::string& now) {
+  void differ(const RecordedStep& step, const std::string& what, const std::string& then,
+              const std::string& now) {
     if (!compare_) return;
     constexpr std::size_t kShown = 300;
     outcome_.differences.push_back(
-        {"replay.differs", "message " + std::to_string(step.sequence) + " at byte " + std::to_string(step.file_offset),
-         what + (then.empty() && now.empty() ? "" : "\n  recorded: " + then.substr(0, kShown) + "\n  this run: " + now.substr(0, kShown)),
+        {"replay.differs",
+         "message " + std::to_string(step.sequence) + " at byte " + std::to_string(step.file_offset),
+         what + (then.empty() && now.empty()
+                     ? ""
+                     : "\n  recorded: " + then.substr(0, kShown) + "\n  this run: " + now.substr(0, kShown)),
          ""});
   }
 

@@ -16,8 +16,8 @@ constexpr const char* kResident = "WeldcellEgm";
 constexpr const char* kJobModule = "WeldcellJob";
 
 std::string jointtarget(const kinematics::Joints& q) {
-  return fmt::format("[[{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}],[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]]", deg(q[0]),
-                     deg(q[1]), deg(q[2]), deg(q[3]), deg(q[4]), deg(q[5]));
+  return fmt::format("[[{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}],[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]]",
+                     deg(q[0]), deg(q[1]), deg(q[2]), deg(q[3]), deg(q[4]), deg(q[5]));
 }
 
 }  // namespace
@@ -32,7 +32,8 @@ std::optional<job::RobotReply> RobotRunner::step(HostTime now) {
   if (phase_ == Phase::Idle || now < next_poll_) return std::nullopt;
   next_poll_ = now + kPollInterval;
   switch (phase_) {
-    case Phase::Idle: break;
+    case Phase::Idle:
+      break;
     case Phase::Halt: {
       // Whatever runs belongs to an earlier request: stop it before anything is written.
       const Status halted = halt();
@@ -68,7 +69,8 @@ std::optional<job::RobotReply> RobotRunner::step(HostTime now) {
       if (!running.ok()) return answer(running.error());
       if (*running != adapters::ExecutionState::Stopped) {
         if (seconds(now - since_) > kMoveTimeout) {
-          return answer(Error{"robot.move", "RAPID", "the move did not end within 60 s", "look at the FlexPendant"});
+          return answer(
+              Error{"robot.move", "RAPID", "the move did not end within 60 s", "look at the FlexPendant"});
         }
         break;
       }
@@ -113,12 +115,16 @@ Status RobotRunner::act() {
   if (auto s = make_ready(); !s.ok()) return s;
   switch (request_.task) {
     case RobotTask::Move:
-      return run_routine(kResident, "WeldcellMove", kResident, "jWeldcellStart", jointtarget(request_.joints));
+      return run_routine(kResident, "WeldcellMove", kResident, "jWeldcellStart",
+                         jointtarget(request_.joints));
     case RobotTask::OpenScan:
-      return run_routine(kResident, "WeldcellScan", kResident, "jWeldcellStart", jointtarget(request_.joints));
+      return run_routine(kResident, "WeldcellScan", kResident, "jWeldcellStart",
+                         jointtarget(request_.joints));
     case RobotTask::Weld:
-      return run_routine(kJobModule, "WeldcellWeld", kJobModule, "nSeamsToSkip", std::to_string(request_.skip_seams));
-    default: return Done{};
+      return run_routine(kJobModule, "WeldcellWeld", kJobModule, "nSeamsToSkip",
+                         std::to_string(request_.skip_seams));
+    default:
+      return Done{};
   }
 }
 
@@ -126,7 +132,8 @@ Status RobotRunner::make_ready() {
   const auto mode = rws_->operation_mode();
   if (!mode.ok()) return mode.error();
   if (*mode != adapters::OperationMode::Auto) {
-    return Error{"robot.mode", "robot controller", std::string("operation mode is ") + adapters::to_string(*mode),
+    return Error{"robot.mode", "robot controller",
+                 std::string("operation mode is ") + adapters::to_string(*mode),
                  "turn the key to automatic and confirm on the FlexPendant"};
   }
   const auto state = rws_->controller_state();
@@ -134,7 +141,8 @@ Status RobotRunner::make_ready() {
   if (*state == adapters::ControllerState::MotorsOff) {
     if (auto s = rws_->set_motors(true); !s.ok()) return s;
   } else if (*state != adapters::ControllerState::MotorsOn) {
-    return Error{"robot.state", "robot controller", std::string("controller state is ") + adapters::to_string(*state),
+    return Error{"robot.state", "robot controller",
+                 std::string("controller state is ") + adapters::to_string(*state),
                  "release the emergency stop or close the guard, then arm and resume"};
   }
   return make_resident();
@@ -157,8 +165,9 @@ Status RobotRunner::make_resident() {
   return Done{};
 }
 
-Status RobotRunner::run_routine(const std::string& module, const std::string& routine, const std::string& symbol_module,
-                                const std::string& symbol, const std::string& literal) {
+Status RobotRunner::run_routine(const std::string& module, const std::string& routine,
+                                const std::string& symbol_module, const std::string& symbol,
+                                const std::string& literal) {
   auto lease = rws_->lease(adapters::MastershipDomain::Rapid);
   if (!lease.ok()) return lease.error();
   if (auto s = rws_->write_symbol(task_, symbol_module, symbol, literal); !s.ok()) return s;

@@ -16,7 +16,8 @@ constexpr Nanoseconds kFileWait = 15 * kSecond;
 
 }  // namespace
 
-SpoolKeeper::SpoolKeeper(Wiring& wiring, adapters::SpoolDir spool) : wiring_(wiring), spool_(std::move(spool)) {
+SpoolKeeper::SpoolKeeper(Wiring& wiring, adapters::SpoolDir spool)
+    : wiring_(wiring), spool_(std::move(spool)) {
   find_interrupted();
 }
 
@@ -30,7 +31,8 @@ void SpoolKeeper::find_interrupted() {
     auto order = text.ok() ? files::parse_job(*text, found.job_file.string())
                            : std::variant<job::JobOrder, files::Faults>(files::Faults{});
     if (!std::holds_alternative<job::JobOrder>(order)) {
-      spdlog::error("job '{}' in active/ cannot be read any more and stays there: look into {}", found.name, job->folder);
+      spdlog::error("job '{}' in active/ cannot be read any more and stays there: look into {}", found.name,
+                    job->folder);
       continue;
     }
     job->arrived.order = std::get<job::JobOrder>(order);

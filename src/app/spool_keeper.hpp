@@ -1,5 +1,5 @@
-// Takes jobs from the spool when the cell is free, rejects what cannot be a job, and puts ended jobs where they belong.
-// Main thread.
+// Takes jobs from the spool when the cell is free, rejects what cannot be a job, and puts ended jobs where
+// they belong. Main thread.
 #pragma once
 
 #include <deque>

@@ -21,14 +21,15 @@ Result<std::vector<rt::Thread>> start_threads(Wiring& wiring, CellThread& cell, 
                                               const std::string& resident_module) {
   constexpr std::size_t kKiB = 1024;
   const bool realtime = wiring.config.realtime != files::RealTime::Off;
-  // FIFO 70 and 60 stay below the kernel's own interrupt threads where those are threaded; EGM answers first, because a
-  // late reply moves the robot, a late laser block waits in the socket.
+  // FIFO 70 and 60 stay below the kernel's own interrupt threads where those are threaded; EGM answers first,
+  // because a late reply moves the robot, a late laser block waits in the socket.
   const std::vector<Row> rows{
       {{"egm", realtime ? 70 : 0, 0, 256 * kKiB}, [&] { run_egm(wiring, egm); }},
       {{"laser", realtime ? 60 : 0, 0, 256 * kKiB}, [&] { run_laser(wiring); }},
       {{"cell", 0, 0, 1024 * kKiB}, [&] { cell.run(); }},
       {{"solver", 0, 10, 4096 * kKiB}, [&] { run_solver(wiring); }},
-      {{"rws", 0, 0, 512 * kKiB}, [&wiring, rws_password, resident_module] { run_rws(wiring, rws_password, resident_module); }},
+      {{"rws", 0, 0, 512 * kKiB},
+       [&wiring, rws_password, resident_module] { run_rws(wiring, rws_password, resident_module); }},
       {{"plc", 0, 0, 256 * kKiB}, [&] { run_plc(wiring, modbus); }},
       {{"projector", 0, 0, 1024 * kKiB}, [&] { run_projector(wiring); }},
   };
@@ -49,7 +50,8 @@ Result<std::vector<rt::Thread>> start_threads(Wiring& wiring, CellThread& cell, 
   if (refused || !locked.ok()) {
     const std::string why = (refused ? "SCHED_FIFO was refused (LimitRTPRIO=80 in the unit) " : "") +
                             (locked.ok() ? std::string{} : locked.error().text());
-    if (wiring.config.realtime == files::RealTime::Required) return give_up({"realtime", "realtime: required", why, ""});
+    if (wiring.config.realtime == files::RealTime::Required)
+      return give_up({"realtime", "realtime: required", why, ""});
     spdlog::warn("not real-time: {}; going on because of realtime: try", why);
   }
   return threads;
@@ -74,7 +76,8 @@ void Watchdog::step(Wiring& wiring, HostTime now) {
   }
   if (interval_ > 0 && all_moved) adapters::notify_watchdog();
   const job::CellStatus status = wiring.status();
-  const std::string text = std::string(job::to_string(status.state)) + (status.job.empty() ? "" : ", job " + status.job);
+  const std::string text =
+      std::string(job::to_string(status.state)) + (status.job.empty() ? "" : ", job " + status.job);
   if (text != last_status_) adapters::notify_status(text);
   last_status_ = text;
 }

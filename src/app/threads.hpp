@@ -12,8 +12,8 @@
 
 namespace weldcell::app {
 
-/// Starts every thread. With `realtime: required` a refused FIFO or mlockall is an error; with `try` it is said once.
-/// Clearing the vector joins them: set wiring.stopping first.
+/// Starts every thread. With `realtime: required` a refused FIFO or mlockall is an error; with `try` it is
+/// said once. Clearing the vector joins them: set wiring.stopping first.
 Result<std::vector<rt::Thread>> start_threads(Wiring& wiring, CellThread& cell, adapters::EgmSocket& egm,
                                               adapters::ModbusServer& modbus, const std::string& rws_password,
                                               const std::string& resident_module);

@@ -17,7 +17,9 @@ namespace {
 class DirectTransport final : public ports::HttpTransport {
  public:
   explicit DirectTransport(sim::Controller& controller) : controller_(&controller) {}
-  Result<ports::HttpReply> exchange(const ports::HttpRequest& request) override { return controller_->handle_rws(request); }
+  Result<ports::HttpReply> exchange(const ports::HttpRequest& request) override {
+    return controller_->handle_rws(request);
+  }
 
  private:
   sim::Controller* controller_;
@@ -112,7 +114,9 @@ class VirtualCell {
   }
 
   void deliver_laser() {
-    const auto pose_at = [this](HostTime t) { return kinematics::forward(setup_->arm, controller_.joints_at(t)); };
+    const auto pose_at = [this](HostTime t) {
+      return kinematics::forward(setup_->arm, controller_.joints_at(t));
+    };
     for (sim::LaserBlock& block : laser_.advance(now_, pose_at)) wire_.push_back(std::move(block));
     while (!wire_.empty() && wire_.front().arrival <= now_) {
       if (cell_.wants_laser()) feed(wire_.front().arrival, job::LaserBytes{std::move(wire_.front().bytes)});
@@ -135,9 +139,14 @@ class VirtualCell {
         order(wire::PlcCommand::Arm);
         order(wire::PlcCommand::Start);
         break;
-      case job::State::Placing: order(wire::PlcCommand::Confirm); break;
-      case job::State::Faulted: order(wire::PlcCommand::Abort); break;
-      default: break;
+      case job::State::Placing:
+        order(wire::PlcCommand::Confirm);
+        break;
+      case job::State::Faulted:
+        order(wire::PlcCommand::Abort);
+        break;
+      default:
+        break;
     }
   }
 
@@ -145,7 +154,8 @@ class VirtualCell {
     outcome_.truth = scene_.truth;
     outcome_.virtual_s = seconds(now_.ns);
     outcome_.passes = cell_.status().pass;
-    if (!outcome_.finished) outcome_.reason = "gave up in state " + std::string(job::to_string(cell_.status().state));
+    if (!outcome_.finished)
+      outcome_.reason = "gave up in state " + std::string(job::to_string(cell_.status().state));
     if (const auto solution = cell_.solution()) {
       const Vec2& centroid = cell_.prepared()->outline.centroid;
       outcome_.solution = solution;
@@ -158,7 +168,9 @@ class VirtualCell {
     }
     if (!outcome_.accepted) {
       if (const auto events = rws_.event_log(5); events.ok()) {
-        for (const auto& e : *events) outcome_.log.push_back("controller's log: " + std::to_string(e.code) + " " + e.title + ": " + e.description);
+        for (const auto& e : *events)
+          outcome_.log.push_back("controller's log: " + std::to_string(e.code) + " " + e.title + ": " +
+                                 e.description);
       }
     }
     outcome_.seam_error_mm = sim::seam_errors_mm(scene_, controller_.weld_traces());

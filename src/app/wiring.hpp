@@ -1,4 +1,5 @@
-// Every queue of the daemon, with its capacity and what happens when it is full, and the few words that threads share.
+// Every queue of the daemon, with its capacity and what happens when it is full, and the few words that
+// threads share.
 #pragma once
 
 #include <array>
@@ -42,8 +43,8 @@ struct ActiveJob {
 /// Something for the cell from an ordinary thread.
 struct Message {
   job::InputBody body;
-  std::shared_ptr<const ActiveJob> job;                 ///< with JobArrived
-  std::shared_ptr<std::promise<std::string>> outcome;   ///< with an operator's command: "" done, else why not
+  std::shared_ptr<const ActiveJob> job;                ///< with JobArrived
+  std::shared_ptr<std::promise<std::string>> outcome;  ///< with an operator's command: "" done, else why not
 };
 
 struct Shown {
@@ -69,14 +70,15 @@ struct Wiring {
   const std::shared_ptr<const cell::CellSetup> setup;
   robot::EgmSession session;  ///< cycles on the egm thread only; its stop and arm bits from any
 
-  // One second of data each. Full: the newest is dropped and counted; the cell turns a loss in a scan into a fault.
+  // One second of data each. Full: the newest is dropped and counted; the cell turns a loss in a scan into a
+  // fault.
   rt::SpscRing<EgmItem, 256> egm;
   rt::SpscRing<LaserItem, 512> laser;
 
-  Mailbox<Message> inbox{1024};                           ///< full: the sender's command fails, a device thread tries again
-  Mailbox<job::RobotRequest> robot_requests{16};          ///< full: fault, the cell waits for an answer in vain
-  Mailbox<std::function<void()>> work{16};                ///< solver; full cannot happen: one order a job step
-  Mailbox<Shown> shown{16};                               ///< full: a picture is skipped
+  Mailbox<Message> inbox{1024};  ///< full: the sender's command fails, a device thread tries again
+  Mailbox<job::RobotRequest> robot_requests{16};  ///< full: fault, the cell waits for an answer in vain
+  Mailbox<std::function<void()>> work{16};        ///< solver; full cannot happen: one order a job step
+  Mailbox<Shown> shown{16};                       ///< full: a picture is skipped
   Mailbox<EndedJob> ended{64};
 
   std::atomic<const plan::MotionPlan*> offered_plan{nullptr};  ///< cell -> egm; the cell keeps the plan alive
@@ -86,7 +88,9 @@ struct Wiring {
   std::array<std::atomic<std::uint64_t>, kThreads> heartbeats{};
   std::atomic<int> egm_port{0}, modbus_port{0};
 
-  void beat(ThreadName thread) { heartbeats[static_cast<std::size_t>(thread)].fetch_add(1, std::memory_order_relaxed); }
+  void beat(ThreadName thread) {
+    heartbeats[static_cast<std::size_t>(thread)].fetch_add(1, std::memory_order_relaxed);
+  }
   job::CellStatus status() const {
     const std::lock_guard lock(status_mutex);
     return last_status;

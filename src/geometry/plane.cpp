@@ -46,7 +46,8 @@ double distance(const Vec2& p, const Segment& s) {
 
 double signed_area(const Polygon& polygon) {
   double twice = 0;
-  for (std::size_t i = 0; i < polygon.size(); ++i) twice += cross(polygon[i], polygon[(i + 1) % polygon.size()]);
+  for (std::size_t i = 0; i < polygon.size(); ++i)
+    twice += cross(polygon[i], polygon[(i + 1) % polygon.size()]);
   return twice / 2;
 }
 

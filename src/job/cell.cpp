@@ -7,43 +7,64 @@ namespace weldcell::job {
 
 const char* to_string(Link link) {
   switch (link) {
-    case Link::Laser: return "laser";
-    case Link::Rws: return "robot controller";
-    case Link::Plc: return "PLC";
+    case Link::Laser:
+      return "laser";
+    case Link::Rws:
+      return "robot controller";
+    case Link::Plc:
+      return "PLC";
   }
   return "?";
 }
 
 const char* to_string(FaultCode code) {
   switch (code) {
-    case FaultCode::None: return "none";
-    case FaultCode::EgmLost: return "EGM frames stopped";
-    case FaultCode::EgmNotStarted: return "EGM did not start";
-    case FaultCode::MotionRefused: return "motion refused";
-    case FaultCode::RobotStopped: return "robot stopped";
-    case FaultCode::LaserLost: return "laser lost";
-    case FaultCode::LaserOverrun: return "laser data lost";
-    case FaultCode::RobotCommand: return "robot command failed";
-    case FaultCode::ProgramStopped: return "weld program stopped early";
-    case FaultCode::PlcLost: return "PLC lost";
-    case FaultCode::StoppedByPerson: return "stopped by a person";
+    case FaultCode::None:
+      return "none";
+    case FaultCode::EgmLost:
+      return "EGM frames stopped";
+    case FaultCode::EgmNotStarted:
+      return "EGM did not start";
+    case FaultCode::MotionRefused:
+      return "motion refused";
+    case FaultCode::RobotStopped:
+      return "robot stopped";
+    case FaultCode::LaserLost:
+      return "laser lost";
+    case FaultCode::LaserOverrun:
+      return "laser data lost";
+    case FaultCode::RobotCommand:
+      return "robot command failed";
+    case FaultCode::ProgramStopped:
+      return "weld program stopped early";
+    case FaultCode::PlcLost:
+      return "PLC lost";
+    case FaultCode::StoppedByPerson:
+      return "stopped by a person";
   }
   return "?";
 }
 
 const char* to_string(RobotTask task) {
   switch (task) {
-    case RobotTask::Move: return "move";
-    case RobotTask::OpenScan: return "open scan";
-    case RobotTask::Stop: return "stop";
-    case RobotTask::Upload: return "upload";
-    case RobotTask::Weld: return "weld";
-    case RobotTask::Query: return "query";
+    case RobotTask::Move:
+      return "move";
+    case RobotTask::OpenScan:
+      return "open scan";
+    case RobotTask::Stop:
+      return "stop";
+    case RobotTask::Upload:
+      return "upload";
+    case RobotTask::Weld:
+      return "weld";
+    case RobotTask::Query:
+      return "query";
   }
   return "?";
 }
 
-Cell::Cell(const cell::CellSetup& setup, const wire::Meas28Layout& laser, bool plc_required, CellTimeouts timeouts)
+Cell::Cell(const cell::CellSetup& setup, const wire::Meas28Layout& laser, bool plc_required,
+           CellTimeouts timeouts)
     : setup_(setup), plc_required_(plc_required), timeouts_(timeouts), laser_decoder_(laser) {
   refresh_plc();
 }
@@ -84,29 +105,35 @@ void Cell::on(const Tick&) {
   switch (status_.state) {
     case State::PreparingScan:
       if (seconds(now_ - state_since_) > timeouts_.egm_open_s) {
-        fault(FaultCode::EgmNotStarted,
-              "no running EGM session within " + std::to_string(static_cast<int>(timeouts_.egm_open_s)) +
-                  " s: look at the FlexPendant's event log, at UdpUc address and port, and at module WeldcellEgm");
+        fault(FaultCode::EgmNotStarted, "no running EGM session within " +
+                                            std::to_string(static_cast<int>(timeouts_.egm_open_s)) +
+                                            " s: look at the FlexPendant's event log, at UdpUc address and "
+                                            "port, and at module WeldcellEgm");
       }
       break;
-    case State::Scanning: watch_scan(); break;
+    case State::Scanning:
+      watch_scan();
+      break;
     case State::Welding:
       if (program_started_ && awaited_request_ == 0 && seconds(now_ - last_query_) > timeouts_.query_s) {
         last_query_ = now_;
         request(RobotTask::Query);
       }
       break;
-    default: break;
+    default:
+      break;
   }
 }
 
 void Cell::watch_scan() {
   if (seconds(now_ - last_laser_) > timeouts_.laser_gap_s) {
-    fault(FaultCode::LaserLost, "no laser readings: check the sensor's power and network, then arm and resume");
+    fault(FaultCode::LaserLost,
+          "no laser readings: check the sensor's power and network, then arm and resume");
   } else if (motion_finished_) {
     if (seconds(now_ - motion_done_at_) >= timeouts_.settle_s) fire(Event::MotionDone);
   } else if (seconds(now_ - last_egm_) > timeouts_.egm_gap_s) {
-    fault(FaultCode::EgmLost, "the robot controller sends no EGM frames: the robot has stopped by its own time-out");
+    fault(FaultCode::EgmLost,
+          "the robot controller sends no EGM frames: the robot has stopped by its own time-out");
   }
 }
 
@@ -117,8 +144,8 @@ void Cell::on(const EgmCycle& cycle) {
   const bool running = feedback.motors == wire::MotorState::On && feedback.mci == wire::MciState::Running &&
                        feedback.rapid != wire::RapidState::Stopped;
   if (status_.state == State::PreparingScan) {
-    // Frames before the program was started anew belong to an earlier session; and a few in a row, so that a session
-    // that dies at once does not count as open.
+    // Frames before the program was started anew belong to an earlier session; and a few in a row, so that a
+    // session that dies at once does not count as open.
     constexpr int kSettledFrames = 5;
     const bool opened = awaited_request_ == 0;
     running_frames_ = running && opened ? running_frames_ + 1 : 0;
@@ -131,7 +158,8 @@ void Cell::on(const EgmCycle& cycle) {
   const auto& plan = scan_plan();
   const robot::EgmReport& report = cycle.report;
   if (!running) {
-    fault(FaultCode::RobotStopped, "the controller left EGM while scanning (motors off, emergency stop or program stop)");
+    fault(FaultCode::RobotStopped,
+          "the controller left EGM while scanning (motors off, emergency stop or program stop)");
   } else if (report.plan_id == plan->id && report.plan_done) {
     motion_finished_ = true;
     motion_done_at_ = now_;
@@ -142,7 +170,8 @@ void Cell::on(const EgmCycle& cycle) {
   } else if (motion_started_) {
     fault(FaultCode::EgmLost, "the EGM session restarted or stopped in the middle of the scan");
   } else if (report.refusal != robot::EgmRefusal::None && seconds(now_ - state_since_) > timeouts_.offer_s) {
-    fault(FaultCode::MotionRefused, std::string("the motion was not begun: ") + robot::to_string(report.refusal));
+    fault(FaultCode::MotionRefused,
+          std::string("the motion was not begun: ") + robot::to_string(report.refusal));
   } else if (seconds(now_ - state_since_) > 2.0) {
     fault(FaultCode::MotionRefused, "the motion did not begin within 2 s");
   }
@@ -212,8 +241,9 @@ void Cell::on(const JobArrived& arrived) {
   }
   if (status_.state != State::Idle) enter(State::Idle);
   resume_state_ = guidance_done_ || !arrived.order.guidance ? State::PreparingScan : State::GuideMoving;
-  log(LogEvent::Level::Warning, "job '" + arrived.order.name +
-                                    "' was interrupted: make the cell safe, then arm and resume it, or abort it");
+  log(LogEvent::Level::Warning,
+      "job '" + arrived.order.name +
+          "' was interrupted: make the cell safe, then arm and resume it, or abort it");
   fire(Event::JobFound);
 }
 
@@ -264,13 +294,16 @@ void Cell::on(const RobotReply& reply) {
   awaited_request_ = 0;
   if (!reply.ok) {
     if (under_way(status_.state)) {
-      fault(FaultCode::RobotCommand, std::string("robot command '") + to_string(awaited_task_) + "': " + reply.text);
+      fault(FaultCode::RobotCommand,
+            std::string("robot command '") + to_string(awaited_task_) + "': " + reply.text);
     }
     return;
   }
   switch (awaited_task_) {
     case RobotTask::Move:
-    case RobotTask::Upload: fire(Event::RobotDone); break;
+    case RobotTask::Upload:
+      fire(Event::RobotDone);
+      break;
     case RobotTask::Weld:
       program_started_ = true;
       last_query_ = now_;
@@ -285,11 +318,13 @@ void Cell::on(const RobotReply& reply) {
         out_.push_back(SaveState{status_.state, status_.seams_done, guidance_done_});
       }
       if (!reply.running && !fire(Event::ProgramEnded)) {
-        fault(FaultCode::ProgramStopped, "the weld program stopped after seam " + std::to_string(status_.seams_done) +
-                                             " of " + std::to_string(status_.seams) + ": " + reply.text);
+        fault(FaultCode::ProgramStopped, "the weld program stopped after seam " +
+                                             std::to_string(status_.seams_done) + " of " +
+                                             std::to_string(status_.seams) + ": " + reply.text);
       }
       break;
-    default: break;
+    default:
+      break;
   }
 }
 

@@ -16,12 +16,17 @@ wire::PackState pack_state(State state) {
     case State::Idle:
     case State::Importing:
     case State::Planning:
-    case State::Ready: return wire::PackState::Idle;
-    case State::Done: return wire::PackState::Complete;
-    case State::Failed: return wire::PackState::Stopped;
+    case State::Ready:
+      return wire::PackState::Idle;
+    case State::Done:
+      return wire::PackState::Complete;
+    case State::Failed:
+      return wire::PackState::Stopped;
     case State::Faulted:
-    case State::Interrupted: return wire::PackState::Aborted;
-    default: return wire::PackState::Execute;
+    case State::Interrupted:
+      return wire::PackState::Aborted;
+    default:
+      return wire::PackState::Execute;
   }
 }
 
@@ -29,15 +34,24 @@ wire::PackState pack_state(State state) {
 std::string order_name(wire::PlcCommand order) {
   using wire::PlcCommand;
   switch (order) {
-    case PlcCommand::None: return "none";
-    case PlcCommand::Reset: return "reset";
-    case PlcCommand::Start: return "start";
-    case PlcCommand::Stop: return "stop";
-    case PlcCommand::Abort: return "abort";
-    case PlcCommand::Clear: return "clear";
-    case PlcCommand::Arm: return "arm";
-    case PlcCommand::Confirm: return "confirm";
-    case PlcCommand::Resume: return "resume";
+    case PlcCommand::None:
+      return "none";
+    case PlcCommand::Reset:
+      return "reset";
+    case PlcCommand::Start:
+      return "start";
+    case PlcCommand::Stop:
+      return "stop";
+    case PlcCommand::Abort:
+      return "abort";
+    case PlcCommand::Clear:
+      return "clear";
+    case PlcCommand::Arm:
+      return "arm";
+    case PlcCommand::Confirm:
+      return "confirm";
+    case PlcCommand::Resume:
+      return "resume";
   }
   return {};
 }
@@ -66,43 +80,62 @@ bool Cell::holds(Guard guard) const {
   const bool from_scan = resuming_ && (guidance_done_ || !job_->order.guidance);
   const bool welds = solution_ && solution_->verdict.verdict == localize::Verdict::Weld;
   switch (guard) {
-    case Guard::Always: return true;
-    case Guard::Guided: return job_->order.guidance;
-    case Guard::Unguided: return !job_->order.guidance;
-    case Guard::MoreSteps: return guide_step_ + 1 < status_.guide_steps;
-    case Guard::LastStep: return guide_step_ + 1 >= status_.guide_steps;
+    case Guard::Always:
+      return true;
+    case Guard::Guided:
+      return job_->order.guidance;
+    case Guard::Unguided:
+      return !job_->order.guidance;
+    case Guard::MoreSteps:
+      return guide_step_ + 1 < status_.guide_steps;
+    case Guard::LastStep:
+      return guide_step_ + 1 >= status_.guide_steps;
     case Guard::MorePasses: {
       if (status_.pass >= max_passes(job_->order) || !solution_) return false;
       const auto pose_verdict = solution_->found.verdict;
       if (pose_verdict == localize::Verdict::Reject) return false;
-      const bool sparse_first = job_->order.inspection.pattern == plan::Pattern::Adaptive && status_.pass == 1;
+      const bool sparse_first =
+          job_->order.inspection.pattern == plan::Pattern::Adaptive && status_.pass == 1;
       return sparse_first || solution_->verdict.verdict == localize::Verdict::Rescan;
     }
-    case Guard::WeldCertified: return welds;
-    case Guard::NotCertified: return !welds;
+    case Guard::WeldCertified:
+      return welds;
+    case Guard::NotCertified:
+      return !welds;
     case Guard::ArcAllowed:
       return job_->order.execute_weld && status_.armed && welds && !solution_->rapid.empty();
-    case Guard::WeldNotWanted: return !job_->order.execute_weld;
-    case Guard::AllSeamsDone: return status_.seams_done >= status_.seams;
-    case Guard::ResumeNowhere: return !resuming_;
-    case Guard::ResumeAtGuide: return resuming_ && !from_scan;
-    case Guard::ResumeAtScan: return from_scan;
+    case Guard::WeldNotWanted:
+      return !job_->order.execute_weld;
+    case Guard::AllSeamsDone:
+      return status_.seams_done >= status_.seams;
+    case Guard::ResumeNowhere:
+      return !resuming_;
+    case Guard::ResumeAtGuide:
+      return resuming_ && !from_scan;
+    case Guard::ResumeAtScan:
+      return from_scan;
   }
   return false;
 }
 
 void Cell::act(Action action) {
   switch (action) {
-    case Action::None: break;
-    case Action::Import: out_.push_back(ImportRequest{}); break;
+    case Action::None:
+      break;
+    case Action::Import:
+      out_.push_back(ImportRequest{});
+      break;
     case Action::Recover:
-      resuming_ = resume_state_ != State::Importing && resume_state_ != State::Planning && resume_state_ != State::Ready;
+      resuming_ = resume_state_ != State::Importing && resume_state_ != State::Planning &&
+                  resume_state_ != State::Ready;
       status_.fault = FaultCode::None;
       status_.fault_text.clear();
       status_.pass = 0;
       out_.push_back(ImportRequest{});
       break;
-    case Action::Plan: out_.push_back(PlanRequest{}); break;
+    case Action::Plan:
+      out_.push_back(PlanRequest{});
+      break;
     case Action::MoveToGuide:
       if (status_.guide_step > 0) ++guide_step_;
       status_.guide_step = 0;
@@ -119,12 +152,16 @@ void Cell::act(Action action) {
       out_.push_back(ShowDrawing{std::move(drawing), status_.guide_step});
       break;
     }
-    case Action::BeginScan: begin_scan(); break;
+    case Action::BeginScan:
+      begin_scan();
+      break;
     case Action::FollowPlan:
       scan_ = std::make_shared<ScanRecord>();
       // Room for the whole pass at once: growing in steps would double the memory at the worst moment.
-      scan_->feedback.reserve(static_cast<std::size_t>(scan_plan()->duration_s() / setup_.egm.cycle_ms * 1000 * 1.1) + 500);
-      scan_->readings.reserve(static_cast<std::size_t>(scan_plan()->duration_s() * setup_.laser.rate_hz * 1.1) + 5000);
+      scan_->feedback.reserve(
+          static_cast<std::size_t>(scan_plan()->duration_s() / setup_.egm.cycle_ms * 1000 * 1.1) + 500);
+      scan_->readings.reserve(
+          static_cast<std::size_t>(scan_plan()->duration_s() * setup_.laser.rate_hz * 1.1) + 5000);
       motion_started_ = motion_finished_ = false;
       last_laser_ = last_egm_ = now_;
       status_.progress = 0;
@@ -135,8 +172,12 @@ void Cell::act(Action action) {
       scan_.reset();
       request(RobotTask::Stop);
       break;
-    case Action::PlanPass: out_.push_back(PassRequest{}); break;
-    case Action::Upload: request(RobotTask::Upload); break;
+    case Action::PlanPass:
+      out_.push_back(PassRequest{});
+      break;
+    case Action::Upload:
+      request(RobotTask::Upload);
+      break;
     case Action::Weld:
       program_started_ = false;
       status_.progress = 0;
@@ -182,11 +223,20 @@ void Cell::request(RobotTask task) {
   request.id = next_request_++;
   request.task = task;
   switch (task) {
-    case RobotTask::Move: request.joints = prepared_->step_poses[static_cast<std::size_t>(guide_step_)].joints; break;
-    case RobotTask::OpenScan: request.joints = scan_plan()->samples.front().q; break;
-    case RobotTask::Upload: request.module_text = solution_->rapid; break;
-    case RobotTask::Weld: request.skip_seams = status_.seams_done; break;
-    default: break;
+    case RobotTask::Move:
+      request.joints = prepared_->step_poses[static_cast<std::size_t>(guide_step_)].joints;
+      break;
+    case RobotTask::OpenScan:
+      request.joints = scan_plan()->samples.front().q;
+      break;
+    case RobotTask::Upload:
+      request.module_text = solution_->rapid;
+      break;
+    case RobotTask::Weld:
+      request.skip_seams = status_.seams_done;
+      break;
+    default:
+      break;
   }
   if (task != RobotTask::Stop) {
     awaited_request_ = request.id;
@@ -219,7 +269,8 @@ void Cell::finish_with(bool accepted, const std::string& verdict, const std::str
   set_armed(false);
   out_.push_back(ShowDrawing{});
   const std::string words = accepted ? reason : reason + ": weld manually";
-  log(accepted ? LogEvent::Level::Info : LogEvent::Level::Error, "job '" + job_->order.name + "' " + verdict + ": " + words);
+  log(accepted ? LogEvent::Level::Info : LogEvent::Level::Error,
+      "job '" + job_->order.name + "' " + verdict + ": " + words);
   out_.push_back(FinishJob{accepted, verdict, words});
 }
 
@@ -227,7 +278,8 @@ int Cell::command(wire::PlcCommand order, const std::string& who) {
   constexpr int kDone = 0, kRefused = 1, kUnknown = 2;
   const std::string name = order_name(order);
   if (name.empty()) {
-    log(LogEvent::Level::Warning, "unknown command " + std::to_string(static_cast<int>(order)) + " from " + who);
+    log(LogEvent::Level::Warning,
+        "unknown command " + std::to_string(static_cast<int>(order)) + " from " + who);
     return kUnknown;
   }
   log(LogEvent::Level::Info, name + " from " + who);
@@ -243,8 +295,11 @@ std::string Cell::obey(wire::PlcCommand order, const std::string& who) {
   const auto outcome = [&](bool taken) { return taken ? std::string{} : not_now; };
   switch (order) {
     case PlcCommand::None:
-    case PlcCommand::Clear: return {};
-    case PlcCommand::Arm: set_armed(true); return {};
+    case PlcCommand::Clear:
+      return {};
+    case PlcCommand::Arm:
+      set_armed(true);
+      return {};
     case PlcCommand::Start:
     case PlcCommand::Resume: {
       const bool start = order == PlcCommand::Start;
@@ -254,8 +309,10 @@ std::string Cell::obey(wire::PlcCommand order, const std::string& who) {
       if (const std::string hindrance = start_hindrance(); !hindrance.empty()) return hindrance;
       return outcome(fire(start ? Event::Start : Event::Resume));
     }
-    case PlcCommand::Confirm: return outcome(fire(Event::Confirm));
-    case PlcCommand::Reset: return outcome(fire(Event::Reset));
+    case PlcCommand::Confirm:
+      return outcome(fire(Event::Confirm));
+    case PlcCommand::Reset:
+      return outcome(fire(Event::Reset));
     case PlcCommand::Stop:
       if (!under_way(status_.state)) return not_now;
       fault(FaultCode::StoppedByPerson, "stop from " + who);
@@ -271,7 +328,8 @@ std::string Cell::start_hindrance() const {
   if (!status_.armed) return "not armed: a person must arm the cell first";
   if (!status_.links[static_cast<std::size_t>(Link::Rws)]) return "the robot controller is not reachable";
   if (!status_.links[static_cast<std::size_t>(Link::Laser)]) return "the laser is not connected";
-  if (plc_required_ && !status_.links[static_cast<std::size_t>(Link::Plc)]) return "the PLC's heartbeat is missing";
+  if (plc_required_ && !status_.links[static_cast<std::size_t>(Link::Plc)])
+    return "the PLC's heartbeat is missing";
   return {};
 }
 

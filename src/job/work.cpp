@@ -23,7 +23,8 @@ weld::CertifyOptions certify_options(const cell::CellSetup& cell) {
   return options;
 }
 
-localize::LocalizeOptions localize_options(const cell::CellSetup& cell, const JobInput& job, const Pose2& planned) {
+localize::LocalizeOptions localize_options(const cell::CellSetup& cell, const JobInput& job,
+                                           const Pose2& planned) {
   const Acceptance& acceptance = job.order.acceptance;
   localize::LocalizeOptions options;
   options.planned = planned;
@@ -42,9 +43,9 @@ edges::EdgeOptions edge_options(const cell::CellSetup& cell, const JobInput& job
   options.spot_mm = cell.laser.spot_mm;
   options.noise_mm = cell.laser.noise_mm;
   // The angle is stated at mid range; the step's foot lies on the table, farther off.
-  options.triangulation_rad =
-      std::atan(std::tan(cell.laser.triangulation_rad) * (cell.laser.start_of_range_mm + cell.laser.range_mm / 2) /
-                (cell.laser.standoff_mm + job.workpiece.height_mm));
+  options.triangulation_rad = std::atan(std::tan(cell.laser.triangulation_rad) *
+                                        (cell.laser.start_of_range_mm + cell.laser.range_mm / 2) /
+                                        (cell.laser.standoff_mm + job.workpiece.height_mm));
   return options;
 }
 
@@ -62,7 +63,8 @@ void add(Evidence& evidence, const edges::EdgeScan& scan) {
 
 std::vector<Segment> outline_at(const workpiece::OutlineTemplate& outline, const Pose2& pose) {
   std::vector<Segment> edges;
-  for (const workpiece::VisibleEdge& edge : outline.edges) edges.push_back({pose * edge.line.a, pose * edge.line.b});
+  for (const workpiece::VisibleEdge& edge : outline.edges)
+    edges.push_back({pose * edge.line.a, pose * edge.line.b});
   return edges;
 }
 
@@ -105,8 +107,10 @@ Result<Prepared> prepare(const cell::CellSetup& cell, const JobInput& job) {
     }
   }
 
-  out.paths = plan::beam_paths(job.workpiece, out.planned, job.order.inspection, first_pattern(job.order.inspection));
-  auto scan = plan::plan_scan(cell, out.paths, top_z_mm(cell, job.workpiece), job.order.inspection.speed_mm_s, cell.home);
+  out.paths =
+      plan::beam_paths(job.workpiece, out.planned, job.order.inspection, first_pattern(job.order.inspection));
+  auto scan = plan::plan_scan(cell, out.paths, top_z_mm(cell, job.workpiece), job.order.inspection.speed_mm_s,
+                              cell.home);
   if (!scan.ok()) return scan.error();
   scan->id = 1;
   out.scan = std::make_shared<const plan::MotionPlan>(std::move(*scan));
@@ -132,15 +136,17 @@ Result<NextPass> plan_next_pass(const cell::CellSetup& cell, const JobInput& job
   return out;
 }
 
-Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared& prepared, const ScanRecord& scan,
-               const Evidence& before) {
+Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared& prepared,
+               const ScanRecord& scan, const Evidence& before) {
   Solution out;
   out.evidence = before;
-  const std::vector<align::SurfacePoint> points = align::align(cell, scan.readings, scan.feedback, out.evidence.align);
+  const std::vector<align::SurfacePoint> points =
+      align::align(cell, scan.readings, scan.feedback, out.evidence.align);
   add_thinned(out.evidence.shown, points);
   const localize::LocalizeOptions options = localize_options(cell, job, prepared.planned);
 
-  // Where the receiver sees a step's foot depends on the edge's direction: a first pose tells it, the second look uses it.
+  // Where the receiver sees a step's foot depends on the edge's direction: a first pose tells it, the second
+  // look uses it.
   edges::EdgeOptions look = edge_options(cell, job);
   const edges::EdgeScan first = edges::detect(points, look);
   Evidence draft = out.evidence;

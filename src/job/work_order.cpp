@@ -37,11 +37,13 @@ InputBody run(const WorkOrder& order) {
       if (!pass.ok()) return PassPlanned{pass.error()};
       return PassPlanned{std::make_shared<const NextPass>(std::move(*pass))};
     }
-    case WorkKind::Solve: break;
+    case WorkKind::Solve:
+      break;
   }
   static const Evidence kNothing;
   const Evidence& before = order.before ? order.before->evidence : kNothing;
-  return SolveDone{std::make_shared<const Solution>(solve(*order.setup, *order.job, *order.prepared, *order.scan, before))};
+  return SolveDone{std::make_shared<const Solution>(
+      solve(*order.setup, *order.job, *order.prepared, *order.scan, before))};
 }
 
 }  // namespace weldcell::job

@@ -28,14 +28,15 @@ def make(bin_dir, *arguments):
 
 def centroid_error_mm(job, truth):
     """Found against true place of the middle of the seams: the pose's origin is a corner, far from where it matters."""
-    points = [p for seam in truth["seams"] for p in seam["part_mm"]] if "part_mm" in truth["seams"][0] else [[600, 300], [0, 0]]
-    cx, cy = (sum(p[i] for p in points) / len(points) for i in (0, 1))
+    points = [p for seam in truth["seams"] for p in seam["line"]]
+    bx, by = (sum(p[i] for p in points) / len(points) for i in (0, 1))
 
-    def place(pose):
+    def in_part(pose):
         a = math.radians(pose["theta_deg"])
-        return pose["x_mm"] + cx * math.cos(a) - cy * math.sin(a), pose["y_mm"] + cx * math.sin(a) + cy * math.cos(a)
+        dx, dy = bx - pose["x_mm"], by - pose["y_mm"]
+        return dx * math.cos(a) + dy * math.sin(a), -dx * math.sin(a) + dy * math.cos(a)
 
-    (fx, fy), (tx, ty) = place(job["found"]), place(job["truth"])
+    (fx, fy), (tx, ty) = in_part(job["found"]), in_part(job["truth"])
     return math.hypot(fx - tx, fy - ty)
 
 
@@ -103,7 +104,7 @@ def wait_state(demo, states, seconds):
 
 
 def operate(demo, order, expect=0):
-    out = subprocess.run([demo.program("weldcell"), "operate", order, "--config", demo.cell], capture_output=True, text=True)
+    out = demo.operate(order)
     check(out.returncode == expect, f"operate {order}: {out.returncode} {out.stderr}")
     return out.stderr
 
@@ -113,7 +114,7 @@ def arm_and_resume(demo):
     wait = time.monotonic() + 20
     operate(demo, "arm")
     while True:
-        out = subprocess.run([demo.program("weldcell"), "operate", "resume", "--config", demo.cell], capture_output=True, text=True)
+        out = demo.operate("resume")
         if out.returncode == 0:
             return
         check(time.monotonic() < wait, f"resume: {out.stderr}")

@@ -1,4 +1,5 @@
-// What happened in a job, gathered from the cell's outputs: events, drawings, times; and the result and report made of it.
+// What happened in a job, gathered from the cell's outputs: events, drawings, times; and the result and
+// report made of it.
 #pragma once
 
 #include <string>
@@ -21,8 +22,8 @@ class JobStory {
   double solve_s() const { return solve_s_; }
 
   /// The page's content, from the cell as it stands after the job's last step.
-  review::ReportInput report(const job::Cell& cell, const cell::CellSetup& setup, const std::string& program_version,
-                             const std::string& accepted_at) const;
+  review::ReportInput report(const job::Cell& cell, const cell::CellSetup& setup,
+                             const std::string& program_version, const std::string& accepted_at) const;
   /// result.json of the job's folder: verdict, pose, welds, figures (docs/FORMATS.md).
   std::string result_json(const job::Cell& cell) const;
 

@@ -1,5 +1,5 @@
-// A job's record: every input that the cell consumed, as it came off the wire, and every output, as one MCAP. Writing is
-// done by one thread; reading gives the inputs back, for replay.
+// A job's record: every input that the cell consumed, as it came off the wire, and every output, as one MCAP.
+// Writing is done by one thread; reading gives the inputs back, for replay.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,8 @@
 
 namespace weldcell::app {
 
-/// Answers of heavy steps are recorded as marks (what came out, as JSON); replay computes them again and compares.
+/// Answers of heavy steps are recorded as marks (what came out, as JSON); replay computes them again and
+/// compares.
 struct WorkMark {
   std::string topic;  ///< "/work/plan", "/work/pass", "/work/solve", "/work/import"
   std::string json;
@@ -33,7 +34,8 @@ class RecordWriter {
   void input(const job::Input& input);
   /// The outputs of the input just written.
   void outputs(HostTime time, const job::Outputs& outputs);
-  void attachment(const std::string& name, const std::string& media_type, HostTime now, const std::string& text);
+  void attachment(const std::string& name, const std::string& media_type, HostTime now,
+                  const std::string& text);
   void flush() { mcap_.flush(); }
   void end() { mcap_.end(); }
 
@@ -51,9 +53,9 @@ class RecordWriter {
 struct RecordedStep {
   std::uint32_t sequence = 0;
   std::uint64_t file_offset = 0;
-  job::Input input;                    ///< for a work mark: a Tick stands in its place
+  job::Input input;  ///< for a work mark: a Tick stands in its place
   std::optional<WorkMark> mark;
-  std::vector<std::string> outputs;    ///< JSON, in order
+  std::vector<std::string> outputs;  ///< JSON, in order
 };
 
 struct Record {

@@ -1,4 +1,5 @@
-// Runs a record again through the same code and compares every output and every answer with what was recorded. One thread.
+// Runs a record again through the same code and compares every output and every answer with what was
+// recorded. One thread.
 #pragma once
 
 #include <memory>
@@ -10,15 +11,16 @@
 
 namespace weldcell::app {
 
-/// KEY=VALUE of `weldcell replay --set`: a dotted key of the cell file ("laser.latency_ms") or, behind "job.", of the job.
+/// KEY=VALUE of `weldcell replay --set`: a dotted key of the cell file ("laser.latency_ms") or, behind
+/// "job.", of the job.
 struct Change {
   std::string key, value;
 };
 
 struct ReplayOutcome {
   std::size_t steps = 0, solves = 0;
-  std::vector<Error> differences;      ///< first one first; `where` names sequence number and byte
-  std::unique_ptr<job::Cell> cell;     ///< after the last step
+  std::vector<Error> differences;   ///< first one first; `where` names sequence number and byte
+  std::unique_ptr<job::Cell> cell;  ///< after the last step
   cell::CellSetup setup;
   wire::Meas28Layout laser_layout;
   JobStory story;

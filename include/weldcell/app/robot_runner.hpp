@@ -1,5 +1,5 @@
-// Carries out the cell's robot requests over RWS, one at a time, without ever waiting inside: begin(), then step() until it
-// answers. Owned by the rws thread; the virtual cell steps it in virtual time.
+// Carries out the cell's robot requests over RWS, one at a time, without ever waiting inside: begin(), then
+// step() until it answers. Owned by the rws thread; the virtual cell steps it in virtual time.
 #pragma once
 
 #include <optional>
@@ -12,13 +12,15 @@ namespace weldcell::app {
 
 class RobotRunner {
  public:
-  /// `resident_module` is the text of WeldcellEgm.mod; it is loaded when the controller does not have it as it is.
+  /// `resident_module` is the text of WeldcellEgm.mod; it is loaded when the controller does not have it as
+  /// it is.
   RobotRunner(adapters::RwsClient& rws, std::string task, std::string resident_module)
       : rws_(&rws), task_(std::move(task)), resident_(std::move(resident_module)) {}
 
   /// Takes a request; one still under way is dropped without an answer (the cell has stopped waiting for it).
   void begin(const job::RobotRequest& request, HostTime now);
-  /// One small piece of the request under way (a handful of HTTP exchanges at most); the answer when it is done.
+  /// One small piece of the request under way (a handful of HTTP exchanges at most); the answer when it is
+  /// done.
   std::optional<job::RobotReply> step(HostTime now);
   bool busy() const { return phase_ != Phase::Idle; }
 

@@ -1,5 +1,5 @@
-// A whole job in virtual time: the daemon's brain and EGM session against the simulated controller and laser, byte for
-// byte, without sockets or sleeping. Deterministic for a seed. Single-threaded.
+// A whole job in virtual time: the daemon's brain and EGM session against the simulated controller and laser,
+// byte for byte, without sockets or sleeping. Deterministic for a seed. Single-threaded.
 #pragma once
 
 #include <memory>
@@ -29,8 +29,8 @@ struct VirtualOutcome {
   Vec2 centroid_error_mm = Vec2::Zero();  ///< found - truth at the template's centroid, Base axes
   double theta_error_rad = 0;
   std::vector<weld::WeldCertificate> certificates;
-  std::vector<double> seam_error_mm;      ///< torch's worst lateral error on the true seam, one a welded seam
-  double scan_s = 0;                      ///< virtual time of all passes
+  std::vector<double> seam_error_mm;  ///< torch's worst lateral error on the true seam, one a welded seam
+  double scan_s = 0;                  ///< virtual time of all passes
   double virtual_s = 0;
   int passes = 0, points = 0;
   std::shared_ptr<const job::Solution> solution;  ///< of the last localization; null when there was none

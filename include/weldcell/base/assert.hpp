@@ -1,4 +1,5 @@
-// WELDCELL_ASSERT: a broken invariant ends the program in every build; the robot stops by its own time-out. Pure.
+// WELDCELL_ASSERT: a broken invariant ends the program in every build; the robot stops by its own time-out.
+// Pure.
 #pragma once
 
 namespace weldcell {

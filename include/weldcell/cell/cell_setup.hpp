@@ -1,4 +1,5 @@
-// What one robot cell is made of: arm, tools, sensor, projector, table and limits, as the cell file states them. Pure.
+// What one robot cell is made of: arm, tools, sensor, projector, table and limits, as the cell file states
+// them. Pure.
 #pragma once
 
 #include <array>
@@ -12,15 +13,15 @@ namespace weldcell::cell {
 
 struct LaserSetup {
   Transform<Flange, Laser> T_flange_laser;
-  double start_of_range_mm = 130;   ///< distance reading 0 lies this far along the beam from the Laser origin
-  double range_mm = 200;            ///< measuring range
+  double start_of_range_mm = 130;  ///< distance reading 0 lies this far along the beam from the Laser origin
+  double range_mm = 200;           ///< measuring range
   double rate_hz = 5000;
-  double latency_ms = 2.7;          ///< pipeline + transport: reading's time stamp minus mid-exposure
+  double latency_ms = 2.7;  ///< pipeline + transport: reading's time stamp minus mid-exposure
   double latency_sigma_ms = 0.5;
-  double spot_mm = 1.1;             ///< beam diameter, 1/e2
-  double triangulation_rad = 0.3;   ///< angle between beam and receiver at mid range
-  double noise_mm = 0.1;            ///< 1 sigma of one reading
-  double standoff_mm = 230;         ///< distance from the Laser origin to the part's top while scanning
+  double spot_mm = 1.1;            ///< beam diameter, 1/e2
+  double triangulation_rad = 0.3;  ///< angle between beam and receiver at mid range
+  double noise_mm = 0.1;           ///< 1 sigma of one reading
+  double standoff_mm = 230;        ///< distance from the Laser origin to the part's top while scanning
 };
 
 struct ProjectorSetup {
@@ -28,7 +29,7 @@ struct ProjectorSetup {
   int width_px = 848, height_px = 480;
   double fx_px = 1071, fy_px = 1071, cx_px = 424, cy_px = 240;
   double k1 = 0, k2 = 0;
-  double distance_mm = 800;         ///< preferred distance to the table
+  double distance_mm = 800;  ///< preferred distance to the table
 };
 
 struct TorchSetup {
@@ -38,8 +39,8 @@ struct TorchSetup {
 };
 
 struct TableSetup {
-  double z_mm = 500;                ///< table top in Base
-  Box2 area;                        ///< where parts may lie, Base mm
+  double z_mm = 500;  ///< table top in Base
+  Box2 area;          ///< where parts may lie, Base mm
 };
 
 /// Limits for every streamed motion, whatever the plan says.
@@ -50,7 +51,7 @@ struct MotionLimits {
   double line_acceleration_mm_s2 = 1500;
   double line_jerk_mm_s3 = 15000;
   double limit_margin_rad = 0.0175;
-  double min_sin_j5 = 0.17;                 ///< |sin J5| of scan and weld poses
+  double min_sin_j5 = 0.17;  ///< |sin J5| of scan and weld poses
 };
 
 struct EgmSetup {

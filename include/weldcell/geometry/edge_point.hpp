@@ -1,4 +1,5 @@
-// One crossing of a height step by the beam, and one straight piece of the beam's travel. Frame Base, mm. Pure.
+// One crossing of a height step by the beam, and one straight piece of the beam's travel. Frame Base, mm.
+// Pure.
 #pragma once
 
 namespace weldcell {

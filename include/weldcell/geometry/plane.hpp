@@ -10,7 +10,8 @@ namespace weldcell {
 
 using Vec2 = Eigen::Vector2d;
 
-/// Pose of a plane frame in another: p_to = R(theta) p_from + (x, y). mm, rad (counter-clockwise seen from +Z).
+/// Pose of a plane frame in another: p_to = R(theta) p_from + (x, y). mm, rad (counter-clockwise seen from
+/// +Z).
 struct Pose2 {
   double x_mm = 0;
   double y_mm = 0;

@@ -1,4 +1,5 @@
-// Rigid transforms whose frames are types: Transform<Base, Flange> takes a Point<Flange> to a Point<Base>. Pure.
+// Rigid transforms whose frames are types: Transform<Base, Flange> takes a Point<Flange> to a Point<Base>.
+// Pure.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,9 +8,10 @@
 namespace weldcell {
 
 // The frames of the cell. docs/TERMS.md defines each once.
-struct Base {};       ///< robot base, the paper's C_R; z up
-struct Flange {};     ///< ABB tool0; +Z out of the flange
-struct Laser {};      ///< origin at zero range; +Z along the beam; +X towards the receiver (triangulation plane = XZ)
+struct Base {};    ///< robot base, the paper's C_R; z up
+struct Flange {};  ///< ABB tool0; +Z out of the flange
+struct Laser {
+};  ///< origin at zero range; +Z along the beam; +X towards the receiver (triangulation plane = XZ)
 struct Torch {};      ///< TCP at the wire tip; +Z out of the nozzle
 struct Projector {};  ///< optical centre; +Z along the optical axis, +X right and +Y down in the picture
 struct Table {};      ///< table top, z up

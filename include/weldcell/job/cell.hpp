@@ -1,5 +1,5 @@
-// The only brain: Cell::step(Input) -> Outputs. Holds the job at hand, its state and its evidence; no thread, clock or I/O.
-// Pure; the cell thread steps it, replay and trials do the same.
+// The only brain: Cell::step(Input) -> Outputs. Holds the job at hand, its state and its evidence; no thread,
+// clock or I/O. Pure; the cell thread steps it, replay and trials do the same.
 #pragma once
 
 #include <array>
@@ -25,8 +25,17 @@ const char* to_string(Link);
 
 /// Fault numbers as the PLC reads them (docs/PLC.md).
 enum class FaultCode : std::uint16_t {
-  None = 0, EgmLost = 10, EgmNotStarted = 11, MotionRefused = 12, RobotStopped = 13, LaserLost = 20, LaserOverrun = 21,
-  RobotCommand = 30, ProgramStopped = 31, PlcLost = 40, StoppedByPerson = 50
+  None = 0,
+  EgmLost = 10,
+  EgmNotStarted = 11,
+  MotionRefused = 12,
+  RobotStopped = 13,
+  LaserLost = 20,
+  LaserOverrun = 21,
+  RobotCommand = 30,
+  ProgramStopped = 31,
+  PlcLost = 40,
+  StoppedByPerson = 50
 };
 const char* to_string(FaultCode);
 
@@ -55,11 +64,11 @@ struct OperatorCommand {
 };
 /// A job taken from the spool. `resume_from` is set for one found interrupted at start.
 struct JobArrived {
-  std::string id;                   ///< the spool folder's name
+  std::string id;  ///< the spool folder's name
   JobOrder order;
   int number = 0;
   bool interrupted = false;
-  int seams_done = 0;               ///< of an interrupted job
+  int seams_done = 0;  ///< of an interrupted job
   bool guidance_done = false;
 };
 struct ImportDone {
@@ -78,9 +87,9 @@ struct SolveDone {
 struct RobotReply {
   std::uint64_t id = 0;
   bool ok = false;
-  std::string text;          ///< cause and mend when not ok
-  bool running = false;      ///< of Query: RAPID executes
-  int seams_done = 0;        ///< of Query
+  std::string text;      ///< cause and mend when not ok
+  bool running = false;  ///< of Query: RAPID executes
+  int seams_done = 0;    ///< of Query
 };
 /// Raw data were lost before they reached the cell (a ring was full).
 struct Overrun {
@@ -88,8 +97,8 @@ struct Overrun {
   std::uint64_t lost = 0;
 };
 
-using InputBody = std::variant<Tick, EgmCycle, LaserBytes, LinkChange, PlcInput, OperatorCommand, JobArrived, ImportDone,
-                               PlanDone, PassPlanned, SolveDone, RobotReply, Overrun>;
+using InputBody = std::variant<Tick, EgmCycle, LaserBytes, LinkChange, PlcInput, OperatorCommand, JobArrived,
+                               ImportDone, PlanDone, PassPlanned, SolveDone, RobotReply, Overrun>;
 struct Input {
   HostTime time;
   InputBody body;
@@ -139,8 +148,8 @@ struct LogEvent {
   std::string text;
 };
 
-using Output = std::variant<RobotRequest, ImportRequest, PlanRequest, PassRequest, SolveRequest, StartMotion, StopMotion,
-                            SetArmed, ShowDrawing, SaveState, FinishJob, LogEvent>;
+using Output = std::variant<RobotRequest, ImportRequest, PlanRequest, PassRequest, SolveRequest, StartMotion,
+                            StopMotion, SetArmed, ShowDrawing, SaveState, FinishJob, LogEvent>;
 using Outputs = std::vector<Output>;
 
 /// What can be asked of the cell at any time.
@@ -170,17 +179,18 @@ struct CellMemory {
 
 /// Timeouts in which the world must answer. Virtual or real seconds.
 struct CellTimeouts {
-  double egm_gap_s = 0.15;
+  double egm_gap_s = 0.4;  ///< below the controller's own time-out of 0.5 s
   double egm_open_s = 30;
   double query_s = 0.4;
-  double laser_gap_s = 0.25;
-  double offer_s = 0.25;      ///< a refusal seen earlier than this after the offer belongs to the plan before
-  double settle_s = 0.1;      ///< rest after a scan, so that the last readings arrive
+  double laser_gap_s = 0.5;
+  double offer_s = 0.25;  ///< a refusal seen earlier than this after the offer belongs to the plan before
+  double settle_s = 0.1;  ///< rest after a scan, so that the last readings arrive
 };
 
 class Cell {
  public:
-  Cell(const cell::CellSetup& setup, const wire::Meas28Layout& laser, bool plc_required, CellTimeouts timeouts = {});
+  Cell(const cell::CellSetup& setup, const wire::Meas28Layout& laser, bool plc_required,
+       CellTimeouts timeouts = {});
 
   Outputs step(const Input& input);
 

@@ -16,23 +16,23 @@ struct Acceptance {
 
 /// How to read a CAD file named by the job.
 struct CadImport {
-  std::string units;          ///< "" = as the file says; mm | inch | m
-  double height_mm = 0;       ///< needed for DXF; 0 = as the file says
+  std::string units;     ///< "" = as the file says; mm | inch | m
+  double height_mm = 0;  ///< needed for DXF; 0 = as the file says
   double edge_radius_mm = 0;
-  std::string drawn;          ///< DXF with round edges: which line is drawn, flat | silhouette; "" = found out
+  std::string drawn;  ///< DXF with round edges: which line is drawn, flat | silhouette; "" = found out
 };
 
 struct JobOrder {
   std::string name;
-  std::string workpiece_file;          ///< YAML, STEP or DXF beside the job
-  std::string revision;                ///< "" or "sha256:<hex>" of the workpiece file
-  std::optional<Pose2> planned;        ///< absent: centred in the working envelope
+  std::string workpiece_file;    ///< YAML, STEP or DXF beside the job
+  std::string revision;          ///< "" or "sha256:<hex>" of the workpiece file
+  std::optional<Pose2> planned;  ///< absent: centred in the working envelope
   bool guidance = true;
   plan::Inspection inspection;
   Acceptance acceptance;
   CadImport cad;
   bool execute_weld = true;
-  int number = 0;                      ///< PLC job number, 0 = none
+  int number = 0;  ///< PLC job number, 0 = none
 };
 
 }  // namespace weldcell::job

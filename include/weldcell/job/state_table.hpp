@@ -1,4 +1,5 @@
-// The job's state machine: one constexpr table of rows {from, event, guard, to, action}, checked when it compiles. Pure.
+// The job's state machine: one constexpr table of rows {from, event, guard, to, action}, checked when it
+// compiles. Pure.
 #pragma once
 
 #include <array>
@@ -19,29 +20,67 @@ enum class State : std::uint8_t {
   Placing = 5,        ///< the step is shown; waits for confirm
   PreparingScan = 6,  ///< RAPID moves to the scan's start and opens EGM
   Scanning = 7,
-  Localizing = 8,     ///< edges, pose, certificates, torch paths
-  PlanningPass = 9,   ///< the next scan pass at the found pose
+  Localizing = 8,    ///< edges, pose, certificates, torch paths
+  PlanningPass = 9,  ///< the next scan pass at the found pose
   Uploading = 10,
   Welding = 11,
   Done = 12,
-  Failed = 13,        ///< ended with a cause; weld manually
-  Faulted = 14,       ///< stopped by a fault; the job stands and can be resumed after a new arm
-  Interrupted = 15    ///< found in the spool at start; can be resumed after an arm
+  Failed = 13,      ///< ended with a cause; weld manually
+  Faulted = 14,     ///< stopped by a fault; the job stands and can be resumed after a new arm
+  Interrupted = 15  ///< found in the spool at start; can be resumed after an arm
 };
 inline constexpr std::size_t kStates = 16;
 
 enum class Event : std::uint8_t {
-  JobArrived, JobFound, Imported, Planned, StepFailed, Start, RobotDone, Confirm, EgmReady, MotionDone, Solved,
-  ProgramEnded, Abort, Reset, Resume
+  JobArrived,
+  JobFound,
+  Imported,
+  Planned,
+  StepFailed,
+  Start,
+  RobotDone,
+  Confirm,
+  EgmReady,
+  MotionDone,
+  Solved,
+  ProgramEnded,
+  Abort,
+  Reset,
+  Resume
 };
 
 enum class Guard : std::uint8_t {
-  Always, Guided, Unguided, MoreSteps, LastStep, MorePasses, WeldCertified, NotCertified, ArcAllowed, WeldNotWanted,
-  AllSeamsDone, ResumeNowhere, ResumeAtGuide, ResumeAtScan
+  Always,
+  Guided,
+  Unguided,
+  MoreSteps,
+  LastStep,
+  MorePasses,
+  WeldCertified,
+  NotCertified,
+  ArcAllowed,
+  WeldNotWanted,
+  AllSeamsDone,
+  ResumeNowhere,
+  ResumeAtGuide,
+  ResumeAtScan
 };
 
 enum class Action : std::uint8_t {
-  None, Import, Plan, MoveToGuide, ShowStep, BeginScan, FollowPlan, Solve, PlanPass, Upload, Weld, Finish, Recover, Clear
+  None,
+  Import,
+  Plan,
+  MoveToGuide,
+  ShowStep,
+  BeginScan,
+  FollowPlan,
+  Solve,
+  PlanPass,
+  Upload,
+  Weld,
+  Finish,
+  Recover,
+  Clear
 };
 
 struct Row {
@@ -100,7 +139,8 @@ inline constexpr std::array kRows{
 
 /// States that hold a job under way: a fault there keeps the job as Faulted.
 constexpr bool under_way(State s) {
-  return s != State::Idle && s != State::Done && s != State::Failed && s != State::Faulted && s != State::Interrupted;
+  return s != State::Idle && s != State::Done && s != State::Failed && s != State::Faulted &&
+         s != State::Interrupted;
 }
 
 const char* to_string(State);
@@ -158,7 +198,8 @@ constexpr bool every_job_can_abort() {
 }
 
 constexpr bool motion_only_from_a_person() {
-  // Rows that first set the arm in motion hang on Start, Confirm or on a step that only these or Resume lead to.
+  // Rows that first set the arm in motion hang on Start, Confirm or on a step that only these or Resume lead
+  // to.
   for (const Row& row : kRows) {
     if (row.from == State::Idle || row.from == State::Done || row.from == State::Failed ||
         row.from == State::Faulted || row.from == State::Interrupted) {

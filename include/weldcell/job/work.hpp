@@ -1,5 +1,5 @@
-// The heavy steps of a job as pure functions: prepare, plan a pass, solve. The daemon runs them on its solver thread, replay
-// and trials call them directly. Pure.
+// The heavy steps of a job as pure functions: prepare, plan a pass, solve. The daemon runs them on its solver
+// thread, replay and trials call them directly. Pure.
 #pragma once
 
 #include <memory>
@@ -28,10 +28,10 @@ struct Prepared {
   workpiece::OutlineTemplate outline;
   Pose2 planned;
   std::vector<guidance::GuideStep> steps;
-  std::vector<plan::GuidePose> step_poses;                 ///< one a step
-  std::vector<plan::BeamPath> paths;                       ///< of the first pass
-  std::shared_ptr<const plan::MotionPlan> scan;            ///< the first pass
-  std::vector<weld::WeldCertificate> nominal;              ///< welds at the planned pose, for reach and drawings
+  std::vector<plan::GuidePose> step_poses;       ///< one a step
+  std::vector<plan::BeamPath> paths;             ///< of the first pass
+  std::shared_ptr<const plan::MotionPlan> scan;  ///< the first pass
+  std::vector<weld::WeldCertificate> nominal;    ///< welds at the planned pose, for reach and drawings
 };
 
 /// Errors: "plan.*" unreachable or refused, "weld.unreachable" at the planned pose, "template.*".
@@ -58,14 +58,15 @@ struct Solution {
   localize::Localization found;
   std::vector<weld::WeldCertificate> certificates;
   weld::JobVerdict verdict;
-  std::vector<weld::TorchPath> torch;   ///< empty unless the verdict is weld
-  std::string rapid;                    ///< module text; empty unless the verdict is weld
+  std::vector<weld::TorchPath> torch;  ///< empty unless the verdict is weld
+  std::string rapid;                   ///< module text; empty unless the verdict is weld
 };
 
-/// Aligns the pass, finds its edges, adds them to `before`, localizes, certifies, and plans the torch when certified.
-/// A torch path that the arm cannot follow at the found pose turns the verdict into reject, with the reason.
-Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared& prepared, const ScanRecord& scan,
-               const Evidence& before);
+/// Aligns the pass, finds its edges, adds them to `before`, localizes, certifies, and plans the torch when
+/// certified. A torch path that the arm cannot follow at the found pose turns the verdict into reject, with
+/// the reason.
+Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared& prepared,
+               const ScanRecord& scan, const Evidence& before);
 
 /// The pass after the first: zigzag at the found pose, every member from both sides.
 struct NextPass {

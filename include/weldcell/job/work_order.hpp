@@ -1,4 +1,5 @@
-// A heavy step that the cell asked for, with everything it needs: run it on any thread, feed the answer back as input. Pure.
+// A heavy step that the cell asked for, with everything it needs: run it on any thread, feed the answer back
+// as input. Pure.
 #pragma once
 
 #include <memory>
@@ -19,8 +20,8 @@ struct WorkOrder {
   std::shared_ptr<const ScanRecord> scan;
 };
 
-/// The order behind an output, or nothing when the output asks for no work of this kind. Call it right after the step that
-/// gave the output.
+/// The order behind an output, or nothing when the output asks for no work of this kind. Call it right after
+/// the step that gave the output.
 std::optional<WorkOrder> work_order(const Output& output, const Cell& cell,
                                     const std::shared_ptr<const cell::CellSetup>& setup);
 

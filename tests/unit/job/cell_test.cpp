@@ -77,7 +77,8 @@ class Driver {
 
   Driver& robot_done() {
     const auto requests = of<RobotRequest>(all);
-    const auto it = std::find_if(requests.rbegin(), requests.rend(), [](const auto& r) { return r.task != RobotTask::Stop; });
+    const auto it = std::find_if(requests.rbegin(), requests.rend(),
+                                 [](const auto& r) { return r.task != RobotTask::Stop; });
     RobotReply reply;
     reply.id = it->id;
     reply.ok = true;
@@ -119,7 +120,9 @@ TEST(Cell, StartNeedsItsLinks) {
   Driver d(true);
   d.ready(false).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Start);
   EXPECT_EQ(d.state(), State::Ready) << "the PLC is missing";
-  d.feed(LinkChange{Link::Plc, true, ""}).feed(LinkChange{Link::Laser, false, "gone"}).order(wire::PlcCommand::Start);
+  d.feed(LinkChange{Link::Plc, true, ""})
+      .feed(LinkChange{Link::Laser, false, "gone"})
+      .order(wire::PlcCommand::Start);
   EXPECT_EQ(d.state(), State::Ready) << "the laser is missing";
   d.feed(LinkChange{Link::Laser, true, ""}).order(wire::PlcCommand::Start);
   EXPECT_EQ(d.state(), State::PreparingScan);

@@ -42,7 +42,8 @@ TEST(StateTable, EveryWayIntoMotionComesFromAPersonsOrder) {
   std::set<State> seen{State::Idle, State::Interrupted, State::Faulted, State::Done, State::Failed};
   for (std::size_t round = 0; round < kStates; ++round) {
     for (const Row& row : kRows) {
-      const bool by_person = row.event == Event::Start || row.event == Event::Confirm || row.event == Event::Resume;
+      const bool by_person =
+          row.event == Event::Start || row.event == Event::Confirm || row.event == Event::Resume;
       const bool resuming = row.guard == Guard::ResumeAtGuide || row.guard == Guard::ResumeAtScan;
       if (!by_person && !resuming && seen.count(row.from) > 0) seen.insert(row.to);
     }
