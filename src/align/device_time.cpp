@@ -74,20 +74,22 @@ DeviceStep LaserClock::step(const wire::LaserReading& reading) {
 
 namespace {
 
-/// tm is the sending instant cut to whole milliseconds, so each frame bounds the age from both sides; all of them together
-/// leave the least room.
+/// tm is the sending instant cut to whole milliseconds, so each frame bounds the age from both sides; all of
+/// them together leave the least room.
 Nanoseconds send_age(std::span<const StampedFeedback> poses) {
   constexpr Nanoseconds kMostAge = 100 * kMillisecond;
   Nanoseconds least = -kMostAge, most = kMostAge;
   for (const auto& p : poses) {
     const auto measured_ms = static_cast<std::uint32_t>(p.feedback.time_us / 1000);
     const Nanoseconds within_ms = (p.feedback.time_us % 1000) * kMicrosecond;
-    const Nanoseconds floor_age = static_cast<std::int32_t>(p.feedback.tm_ms - measured_ms) * kMillisecond - within_ms;
+    const Nanoseconds floor_age =
+        static_cast<std::int32_t>(p.feedback.tm_ms - measured_ms) * kMillisecond - within_ms;
     if (floor_age <= -kMillisecond || floor_age > kMostAge) return 0;
     least = std::max(least, floor_age);
     most = std::min(most, floor_age + kMillisecond);
   }
-  // Jitter between reading the posture and sending can cross the bounds; their middle is still the best guess.
+  // Jitter between reading the posture and sending can cross the bounds; their middle is still the best
+  // guess.
   return poses.empty() ? 0 : (least + most) / 2;
 }
 

@@ -41,8 +41,8 @@ class RobotClock {
   /// nullopt: the message repeats or precedes an earlier one and is left out.
   std::optional<DeviceStep> step(const StampedFeedback& pose);
   void rewind() { first_ = true; }
-  /// How much older the measurement is than the sending of its frame: feedBack.time against tm, which run from one
-  /// origin (EGM wire facts), half a millisecond at worst; 0 where the two do not go together.
+  /// How much older the measurement is than the sending of its frame: feedBack.time against tm, which run
+  /// from one origin (EGM wire facts), half a millisecond at worst; 0 where the two do not go together.
   Nanoseconds send_age_ns() const { return send_age_ns_; }
 
  private:

@@ -9,8 +9,8 @@
 namespace weldcell::ports {
 
 struct HttpRequest {
-  std::string method;        ///< GET, POST, PUT, DELETE
-  std::string path;          ///< with query, from the root: "/rw/panel/ctrlstate?json=1"
+  std::string method;  ///< GET, POST, PUT, DELETE
+  std::string path;    ///< with query, from the root: "/rw/panel/ctrlstate?json=1"
   std::string body;
   std::string content_type = "application/x-www-form-urlencoded";
 };

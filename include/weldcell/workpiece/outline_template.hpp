@@ -1,4 +1,5 @@
-// What the laser can see of a workpiece from above: oriented visible edges, built once from the members. Pure.
+// What the laser can see of a workpiece from above: oriented visible edges, built once from the members.
+// Pure.
 #pragma once
 
 #include <string>
@@ -18,25 +19,26 @@ struct VisibleEdge {
   bool round = false;  ///< the member's round top edge runs along it
 };
 
-/// Symmetry or near-symmetry of the outline under a rotation about the centroid (plus the shift that fits best).
+/// Symmetry or near-symmetry of the outline under a rotation about the centroid (plus the shift that fits
+/// best).
 struct Symmetry {
-  Pose2 map;           ///< frame Part -> frame Part
-  double gap_mm = 0;   ///< RMS distance between the outline and its image; 0 = a true symmetry
+  Pose2 map;          ///< frame Part -> frame Part
+  double gap_mm = 0;  ///< RMS distance between the outline and its image; 0 = a true symmetry
 };
 
 struct OutlineTemplate {
   std::string name;
   std::vector<std::string> member_names;
   std::vector<VisibleEdge> edges;
-  std::vector<Polygon> members;        ///< outlines as in the workpiece
-  std::vector<Symmetry> symmetries;    ///< identity excluded; true ones first, then by gap
-  Vec2 centroid = Vec2::Zero();        ///< of the visible edges, by length; errors are stated here
-  double radius_mm = 0;                ///< farthest visible point from the centroid
+  std::vector<Polygon> members;      ///< outlines as in the workpiece
+  std::vector<Symmetry> symmetries;  ///< identity excluded; true ones first, then by gap
+  Vec2 centroid = Vec2::Zero();      ///< of the visible edges, by length; errors are stated here
+  double radius_mm = 0;              ///< farthest visible point from the centroid
   double height_mm = 0;
 };
 
-/// Sides hidden in joints (closer than joint_gap_mm to another member's side, or inside another member) are no edges.
-/// Errors: "template.empty" when nothing is visible.
+/// Sides hidden in joints (closer than joint_gap_mm to another member's side, or inside another member) are
+/// no edges. Errors: "template.empty" when nothing is visible.
 Result<OutlineTemplate> build_template(const Workpiece& workpiece, double joint_gap_mm = 0.5);
 
 }  // namespace weldcell::workpiece
