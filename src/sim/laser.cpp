@@ -28,10 +28,11 @@ enum Purpose : std::uint64_t { White = 1, Outlier, OutlierSize, Dropout, Transpo
 /// Where in the spot, in units of its 1/e2 radius, and how much light.
 struct SpotPoint {
   double x, y, weight;
+  std::size_t shot;  ///< 0, 1, 2: which third of the exposure it stands for
 };
 
 std::vector<SpotPoint> spot_points(bool whole_spot) {
-  if (!whole_spot) return {{0, 0, 1}};
+  if (!whole_spot) return {{0, 0, 1, 1}};
   std::vector<SpotPoint> out;
   double sum = 0;
   for (int i = -4; i <= 4; ++i) {
@@ -39,7 +40,7 @@ std::vector<SpotPoint> spot_points(bool whole_spot) {
       const double x = i * 0.36, y = j * 0.65;
       const double weight = std::exp(-2 * (x * x + y * y));
       if (weight < 0.002) continue;
-      out.push_back({x, y, weight});
+      out.push_back({x, y, weight, static_cast<std::size_t>(i + 2 * j + 12) % 3});
       sum += weight;
     }
   }
@@ -79,9 +80,12 @@ struct LaserDevice::State {
 
   double speckle(double x_mm, double y_mm) const;
   bool only_table(const Eigen::Vector3d& at_table, const Eigen::Vector3d& at_top, const Eigen::Vector3d& eye);
-  double look(const Eigen::Isometry3d& laser, double& light) const;
+  double look(const std::array<Eigen::Isometry3d, 3>& shots, double& light) const;
   double centroid(std::array<Seen, 64>& seen, std::size_t count, double& light) const;
-  wire::LaserReading measure(std::uint64_t k, const Eigen::Isometry3d& laser);
+  wire::LaserReading measure(std::uint64_t k, HostTime t, const PoseAt& pose_at);
+  Eigen::Isometry3d beam(HostTime t, const PoseAt& pose_at) const {
+    return pose_at(t).iso * setup.T_flange_laser.iso;
+  }
   void finish_block(HostTime last, std::vector<LaserBlock>& out);
 
   const Scene scene;
@@ -121,15 +125,17 @@ double LaserDevice::State::speckle(double x_mm, double y_mm) const {
 
 /// Distance that the detector decodes along the beam, from every lit and visible point of the spot; light =
 /// share of a full spot in the peak that was taken.
-double LaserDevice::State::look(const Eigen::Isometry3d& laser, double& light) const {
-  const Eigen::Vector3d from = laser.translation(), x = laser.linear().col(0), y = laser.linear().col(1),
-                        down = laser.linear().col(2);
-  const Eigen::Vector3d eye = from + baseline_mm * x;
+double LaserDevice::State::look(const std::array<Eigen::Isometry3d, 3>& shots, double& light) const {
   const double radius = truth.spot_mm / 2;
   std::array<Seen, 64> seen{};
   std::size_t count = 0;
   light = 0;
   for (const SpotPoint& point : spot) {
+    // The spot's points are dealt out to the begin, middle and end of the exposure: the motion's blur at one
+    // spot's cost.
+    const Eigen::Isometry3d& laser = shots[point.shot];
+    const Eigen::Vector3d from = laser.translation(), x = laser.linear().col(0), y = laser.linear().col(1),
+                          down = laser.linear().col(2), eye = from + baseline_mm * x;
     const double dx = point.x * radius, dy = point.y * radius;
     const Eigen::Vector3d ray = from + dx * x + dy * y;
     const double z = surface.cast(ray, down);
@@ -180,7 +186,8 @@ bool LaserDevice::State::only_table(const Eigen::Vector3d& at_table, const Eigen
   return clear(at_top - at_table) && (!truth.shadows || clear(view));
 }
 
-wire::LaserReading LaserDevice::State::measure(std::uint64_t k, const Eigen::Isometry3d& laser) {
+wire::LaserReading LaserDevice::State::measure(std::uint64_t k, HostTime t, const PoseAt& pose_at) {
+  const Eigen::Isometry3d laser = beam(t, pose_at);
   wire::LaserReading out;
   const auto roll = [&](Purpose purpose) { return mixed(scene.seed, k, purpose); };
   const auto invalid = [&](std::uint32_t code) {
@@ -201,7 +208,8 @@ wire::LaserReading LaserDevice::State::measure(std::uint64_t k, const Eigen::Iso
   } else if (only_table(at_table, at_top, from + baseline_mm * laser.linear().col(0))) {
     distance = to_table;
   } else {
-    distance = look(laser, light);
+    const Nanoseconds third = from_seconds(truth.exposure_ms * 1e-3 / 3);
+    distance = look({beam(t - third, pose_at), laser, beam(t + third, pose_at)}, light);
   }
   if (light < kLeastLight || distance <= 0) return invalid(kNoPeak);
   if (distance < setup.start_of_range_mm) return invalid(kBeforeRange);
@@ -245,8 +253,7 @@ std::vector<LaserBlock> LaserDevice::advance(HostTime now, const PoseAt& pose_at
   std::vector<LaserBlock> out;
   s.now = now;
   for (HostTime t = s.instant(s.next); t <= now; t = s.instant(s.next)) {
-    const Eigen::Isometry3d laser = pose_at(t).iso * s.setup.T_flange_laser.iso;
-    wire::LaserReading reading = s.measure(s.next, laser);
+    wire::LaserReading reading = s.measure(s.next, t, pose_at);
     reading.counter = static_cast<std::uint32_t>(s.next);
     reading.timestamp_us = s.stamp_us(t + from_seconds(s.truth.latency_ms * 1e-3));
     s.block.push_back(reading);

@@ -24,7 +24,8 @@ class LaserDevice {
   explicit LaserDevice(const Scene& scene);
   ~LaserDevice();
 
-  /// All blocks whose samples were taken up to true time `now`; pose_at is asked for instants up to `now`.
+  /// All blocks whose samples were taken up to true time `now`; pose_at is asked for instants up to `now` and
+  /// half an exposure more.
   std::vector<LaserBlock> advance(HostTime now, const PoseAt& pose_at);
   /// "laser_drop": the connection is gone for duration_s (0: for good); "laser_stall": blocks are held back
   /// that long. False when the kind is unknown.
