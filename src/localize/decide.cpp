@@ -22,7 +22,7 @@ constexpr double kExplains_nats = 2.7;
 constexpr double kNothing_nats = -1e300;
 constexpr double kDisplaced_nats = 6.5;
 /// A single point on a hidden side counts when clutter would put one there in fewer scans than this.
-constexpr double kChance = 0.005;
+constexpr double kChance = 0.012;
 constexpr double kMinInlierShare = 0.35;
 constexpr double kMinRate = 0.5;
 /// What a pose must be known to (two sigmas) when no weld says so more exactly.
@@ -144,7 +144,8 @@ bool joint_open(const Situation& s, Localization& result) {
     }
   }
   if (s.evidence.exposed_by_chance > 0.1 * s.evidence.exposed) return false;
-  say(result, Verdict::Reject, "wrong_revision",
+  // One point may still be chance: looking again settles it.
+  say(result, s.evidence.exposed == 1 ? Verdict::Rescan : Verdict::Reject, "wrong_revision",
       fmt::format("The joint of {} stands open: it is shorter than drawn, or not in its place. Check the "
                   "part against "
                   "drawing {}.",

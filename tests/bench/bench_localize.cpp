@@ -213,7 +213,8 @@ class Bench {
         add("extreme " + name + " false reject", t.share(t.false_reject), "%", NAN, 5);
         add("extreme " + name + " time median", t.milliseconds(0.5), "ms", NAN, 15);
       }
-      if (wanted("hard " + name)) {
+      // Three members less the missing one leave a direction that nothing measures.
+      if (wanted("hard " + name) && part.workpiece.members.size() > 3) {
         const Tally t = cell(part, hard, options_.trials);
         add("hard " + name + " basin", t.share(t.basin), "%", 96, 99.5, Better::Higher);
         add("hard " + name + " false accept", t.share(t.false_accept), "%", NAN, 0.1);
