@@ -1,7 +1,11 @@
 // weldcell-cad: one STEP or DXF file -> a workpiece as YAML on stdout. Runs as a limited child of the other
 // programs.
+#include <unistd.h>
+
 #include <Standard_Failure.hxx>
+#include <array>
 #include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -106,6 +110,26 @@ int run(const std::string& path, const cad::Options& options) {
   return std::fflush(stdout) == 0 ? 0 : 3;
 }
 
+/// The CAD library crashes on some damaged files; the user still gets one line.
+extern "C" void on_crash(int) {
+  static constexpr char kLine[] =
+      "the CAD library crashed on this file: heal the model and export it again\n";
+  const ssize_t written = ::write(2, kLine, sizeof kLine - 1);
+  ::_exit(written > 0 ? 2 : 3);
+}
+
+void catch_crashes() {
+  static std::array<char, 65536> stack;
+  stack_t alternate{};
+  alternate.ss_sp = stack.data();
+  alternate.ss_size = stack.size();
+  ::sigaltstack(&alternate, nullptr);
+  struct sigaction action {};
+  action.sa_handler = on_crash;
+  action.sa_flags = SA_ONSTACK;
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) ::sigaction(signal, &action, nullptr);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -128,6 +152,7 @@ int main(int argc, char** argv) {
     }
   }
   if (path.empty()) return refuse("weldcell-cad: which file? try --help");
+  catch_crashes();
   try {
     return run(path, options);
   } catch (const Standard_Failure& failure) {

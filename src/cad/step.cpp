@@ -2,12 +2,16 @@
 
 #include <BRepBuilderAPI_Transform.hxx>
 #include <IFSelect_ReturnStatus.hxx>
+#include <Interface_Check.hxx>
+#include <Interface_CheckIterator.hxx>
+#include <Interface_InterfaceModel.hxx>
 #include <Interface_Static.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
 #include <Message_PrinterOStream.hxx>
 #include <STEPCAFControl_Reader.hxx>
 #include <STEPControl_Reader.hxx>
+#include <StepShape_ManifoldSolidBrep.hxx>
 #include <TColStd_SequenceOfAsciiString.hxx>
 #include <TDF_LabelSequence.hxx>
 #include <TDataStd_Name.hxx>
@@ -16,9 +20,11 @@
 #include <TopoDS.hxx>
 #include <XCAFDoc_DocumentTool.hxx>
 #include <XCAFDoc_ShapeTool.hxx>
+#include <XSControl_WorkSession.hxx>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "cad/cad_part.hpp"
 #include "cad/solid.hpp"
@@ -121,6 +127,49 @@ double declared_mm(STEPControl_Reader& reader, std::string& word) {
   return known == kKnown.end() ? 0 : known->second;
 }
 
+/// Geometry and topology; real files often have colours, fonts and annotations wrong, which shape no member.
+bool shapes_a_member(const Handle(Interface_InterfaceModel) & model, int number) {
+  if (number < 1 || number > model->NbEntities()) return true;
+  const std::string type = model->Value(number)->DynamicType()->Name();
+  if (type.find("Representation") != std::string::npos)
+    return false;  // a list of items, annotations among them
+  return type.rfind("StepGeom_", 0) == 0 || type.rfind("StepShape_", 0) == 0;
+}
+
+/// A record that does not read would be left out in silence, and the member with it; some crash the library
+/// later.
+Status check_records(STEPControl_Reader& reader) {
+  Interface_CheckIterator checks = reader.WS()->ModelCheckList();
+  int damaged = 0, first = 0;
+  std::string reason;
+  for (checks.Start(); checks.More(); checks.Next()) {
+    const Handle(Interface_Check)& check = checks.Value();
+    if (!check->HasFailed() || !shapes_a_member(reader.Model(), checks.Number())) continue;
+    if (damaged++ > 0) continue;
+    first = checks.Number();
+    reason = check->CFail(1, Standard_True);
+  }
+  if (damaged == 0) return Done{};
+  return fault("cad.unreadable",
+               fmt::format("{} record(s) are damaged, the first is number {}: {}", damaged, first, reason),
+               "is the file complete? export it again");
+}
+
+/// Every solid of the file must have come through.
+Status check_complete(STEPControl_Reader& reader, const std::vector<NamedSolid>& solids) {
+  const Handle(Interface_InterfaceModel) model = reader.Model();
+  std::size_t in_file = 0;
+  for (int i = 1; i <= model->NbEntities(); ++i) {
+    if (model->Value(i)->IsKind(STANDARD_TYPE(StepShape_ManifoldSolidBrep))) ++in_file;
+  }
+  std::set<const void*> translated;
+  for (const NamedSolid& solid : solids) translated.insert(solid.shape.TShape().get());
+  if (translated.size() >= in_file) return Done{};
+  return fault("cad.unreadable",
+               fmt::format("only {} of its {} solids can be translated", translated.size(), in_file),
+               "heal the model in the CAD system and export it again");
+}
+
 Result<std::vector<NamedSolid>> load(const std::string& path, const Options& options, bool& inch) {
   // The library reports its progress on stdout by default, which is ours.
   Message::DefaultMessenger()->RemovePrinters(STANDARD_TYPE(Message_PrinterOStream));
@@ -133,6 +182,7 @@ Result<std::vector<NamedSolid>> load(const std::string& path, const Options& opt
     return fault("cad.unreadable", "is not a STEP file that can be read",
                  "export it again as AP203, AP214 or AP242");
   }
+  if (Status sound = check_records(reader.ChangeReader()); !sound.ok()) return sound.error();
   std::string word;
   const double declared = declared_mm(reader.ChangeReader(), word);
   inch = declared == 25.4;
@@ -160,6 +210,7 @@ Result<std::vector<NamedSolid>> load(const std::string& path, const Options& opt
     return fault("cad.limit", fmt::format("holds more than {} solids", kMaxMembers),
                  "export only the frame's members");
   }
+  if (Status whole = check_complete(reader.ChangeReader(), solids); !whole.ok()) return whole.error();
   make_names_unique(solids);
   const gp_Trsf move = onto_table(options.plane, asked > 0 && declared > 0 ? asked / declared : 1.0);
   for (NamedSolid& solid : solids)

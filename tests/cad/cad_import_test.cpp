@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 
 #include "weldcell/adapters/cad_child.hpp"
@@ -186,6 +187,36 @@ TEST_F(CadFiles, BrokenStepFilesAreRefusedNotCrashed) {
   EXPECT_NE(refusal(write("empty.step", "")), "");
   EXPECT_NE(refusal(write("noise.step", std::string(5000, '\x7f'))), "");
   EXPECT_NE(refusal(write("part.pdf", "x")), "");
+}
+
+TEST_F(CadFiles, DamagedFilesEndInAWorkpieceOrOneLine) {
+  constexpr unsigned kSeed = 5;
+  std::mt19937 random(kSeed);
+  int refused = 0;
+  for (const char* name : {"mitre_4x40x40.step", "mitre_4x40x40_lwpoly.dxf", "ladder_insert.dxf"}) {
+    const std::string whole = slurp(kParts + name);
+    for (int round = 0; round < 12; ++round) {
+      std::string hurt = whole;
+      for (int k = 0; k < 20; ++k) hurt[random() % hurt.size()] = static_cast<char>(random() % 256);
+      const std::string file = write(std::string("hurt") + fs::path(name).extension().string(), hurt);
+      SCOPED_TRACE("seed " + std::to_string(kSeed) + " " + name + " round " + std::to_string(round));
+      const auto read = import_cad_yaml(kProgram, file, dxf_options(), "");
+      if (read.ok()) continue;
+      ++refused;
+      EXPECT_EQ(read.error().code, "cad.refused") << read.error().text();
+      EXPECT_EQ(read.error().text().find('\n'), std::string::npos);
+    }
+  }
+  EXPECT_GE(refused, 12);
+}
+
+TEST_F(CadFiles, AStepThatLostAReferenceIsRefusedNotShortened) {
+  const std::string step = slurp(kParts + "mitre_4x40x40.step");
+  const std::size_t at = step.find("EDGE_CURVE('',#");
+  ASSERT_NE(at, std::string::npos);
+  std::string hurt = step;
+  hurt.replace(at, 15, "EDGE_CURVE('',$");
+  EXPECT_THAT(refusal(write("lost.step", hurt)), HasSubstr("damaged"));
 }
 
 /// A DXF of the given entities and blocks, in millimetres.
