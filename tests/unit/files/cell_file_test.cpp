@@ -56,7 +56,8 @@ TEST(CellFile, ReadsTheDemoCell) {
   const Eigen::Matrix3d torch = c.setup.torch.T_flange_torch.rotation();
   EXPECT_LT((torch - Eigen::AngleAxisd(kPi / 4, Eigen::Vector3d::UnitY()).toRotationMatrix()).norm(), 1e-12);
   EXPECT_DOUBLE_EQ(c.setup.table.area.max.x(), 1500);
-  EXPECT_EQ(c.spool_dir, (std::filesystem::absolute(kConfig) / "../build/demo/spool").lexically_normal().string());
+  EXPECT_EQ(c.spool_dir,
+            (std::filesystem::absolute(kConfig) / "../build/demo/spool").lexically_normal().string());
   EXPECT_EQ(c.cad_cache_dir, c.state_dir + "/cad");
   EXPECT_EQ(c.realtime, RealTime::Try);
 }
