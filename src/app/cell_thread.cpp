@@ -174,7 +174,8 @@ void CellThread::save(const job::SaveState& state) {
   if (!active_) return;
   const nlohmann::json json{{"state", job::to_string(state.state)},
                             {"seams_done", state.seams_done},
-                            {"guidance_done", state.guidance_done}};
+                            {"guidance_done", state.guidance_done},
+                            {"weld_begun", state.weld_begun}};
   const Status written = write_file_durably(active_->folder + "/state.json", json.dump() + "\n");
   if (!written.ok()) spdlog::error("{}", written.error().text());
   if (journal_) {

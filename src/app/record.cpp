@@ -81,7 +81,8 @@ std::pair<std::string, json> small_input(const job::InputBody& body) {
                      {"number", a.number},
                      {"interrupted", a.interrupted},
                      {"seams_done", a.seams_done},
-                     {"guidance_done", a.guidance_done}}};
+                     {"guidance_done", a.guidance_done},
+                     {"weld_begun", a.weld_begun}}};
           },
           [](const RobotReply& r) -> Named {
             return {"/robot/reply",
@@ -89,7 +90,8 @@ std::pair<std::string, json> small_input(const job::InputBody& body) {
                      {"ok", r.ok},
                      {"text", r.text},
                      {"running", r.running},
-                     {"seams_done", r.seams_done}}};
+                     {"seams_done", r.seams_done},
+                     {"seams_begun", r.seams_begun}}};
           },
           [](const Overrun& o) -> Named {
             return {"/cell/overrun", {{"link", static_cast<int>(o.link)}, {"lost", o.lost}}};
@@ -124,10 +126,12 @@ std::optional<job::InputBody> small_input_from(const std::string& topic, const j
     arrived.interrupted = j.at("interrupted");
     arrived.seams_done = j.at("seams_done");
     arrived.guidance_done = j.at("guidance_done");
+    arrived.weld_begun = j.at("weld_begun");
     return arrived;
   }
   if (topic == "/robot/reply")
-    return RobotReply{j.at("id"), j.at("ok"), j.at("text"), j.at("running"), j.at("seams_done")};
+    return RobotReply{j.at("id"),      j.at("ok"),         j.at("text"),
+                      j.at("running"), j.at("seams_done"), j.at("seams_begun")};
   if (topic == "/cell/overrun") return Overrun{static_cast<Link>(j.at("link").get<int>()), j.at("lost")};
   return std::nullopt;
 }

@@ -118,7 +118,8 @@ std::string output_json(const job::Output& output) {
                           return {{"output", "state"},
                                   {"state", to_string(s.state)},
                                   {"seams_done", s.seams_done},
-                                  {"guidance_done", s.guidance_done}};
+                                  {"guidance_done", s.guidance_done},
+                                  {"weld_begun", s.weld_begun}};
                         },
                         [](const FinishJob& f) -> json {
                           return {{"output", "finish"},

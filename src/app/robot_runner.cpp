@@ -188,9 +188,12 @@ job::RobotReply RobotRunner::query() {
   if (!running.ok()) return answer(running.error());
   const auto seams = rws_->read_symbol(task_, kJobModule, "nSeamsDone");
   if (!seams.ok()) return answer(seams.error());
+  const auto begun = rws_->read_symbol(task_, kJobModule, "nSeamsBegun");
+  if (!begun.ok()) return answer(begun.error());
   job::RobotReply reply = answer(Done{});
   reply.running = *running != adapters::ExecutionState::Stopped;
   reply.seams_done = std::atoi(seams->c_str());
+  reply.seams_begun = std::atoi(begun->c_str());
   if (!reply.running) reply.text = last_event_text();
   return reply;
 }

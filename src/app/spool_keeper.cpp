@@ -49,6 +49,7 @@ void SpoolKeeper::find_interrupted() {
         }
         job->arrived.seams_done = json.value("seams_done", 0);
         job->arrived.guidance_done = json.value("guidance_done", false);
+        job->arrived.weld_begun = json.value("weld_begun", false);
       }
     }
     interrupted_.push_back(std::move(job));

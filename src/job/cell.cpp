@@ -233,6 +233,9 @@ void Cell::on(const JobArrived& arrived) {
   status_.pass = 0;
   status_.progress = 0;
   status_.seams_done = arrived.seams_done;
+  weld_begun_ = arrived.weld_begun;
+  seams_known_ = !weld_begun_;
+  interrupted_seam_ = 0;
   status_.seams = 0;
   status_.plc.job_number = 0;
   if (!arrived.interrupted) {
@@ -309,13 +312,16 @@ void Cell::on(const RobotReply& reply) {
       last_query_ = now_;
       break;
     case RobotTask::Query:
-      if (status_.state != State::Welding) break;
+      if (status_.state != State::Welding) {
+        settle_seams(reply);
+        break;
+      }
       if (reply.seams_done > status_.seams_done) {
         status_.seams_done = reply.seams_done;
         status_.progress = status_.seams > 0 ? static_cast<double>(status_.seams_done) / status_.seams : 1;
         log(LogEvent::Level::Info, "seam " + std::to_string(status_.seams_done) + " of " +
                                        std::to_string(status_.seams) + " welded");
-        out_.push_back(SaveState{status_.state, status_.seams_done, guidance_done_});
+        save_state();
       }
       if (!reply.running && !fire(Event::ProgramEnded)) {
         fault(FaultCode::ProgramStopped, "the weld program stopped after seam " +
@@ -326,6 +332,18 @@ void Cell::on(const RobotReply& reply) {
     default:
       break;
   }
+}
+
+void Cell::settle_seams(const RobotReply& reply) {
+  status_.seams_done = std::max(status_.seams_done, reply.seams_done);
+  if (reply.seams_begun > status_.seams_done) {
+    // Nobody knows how far its arc came: a machine must not weld it again.
+    interrupted_seam_ = status_.seams_done = reply.seams_begun;
+    log(LogEvent::Level::Warning,
+        "seam " + std::to_string(interrupted_seam_) + " was interrupted: it is left out; finish it by hand");
+  }
+  seams_known_ = true;
+  save_state();
 }
 
 void Cell::on(const Overrun& overrun) {

@@ -73,7 +73,11 @@ void Cell::enter(State state) {
   log(LogEvent::Level::Info, std::string(to_string(status_.state)) + " -> " + to_string(state));
   status_.state = state;
   state_since_ = now_;
-  out_.push_back(SaveState{state, status_.seams_done, guidance_done_});
+  save_state();
+}
+
+void Cell::save_state() {
+  out_.push_back(SaveState{status_.state, status_.seams_done, guidance_done_, weld_begun_});
 }
 
 bool Cell::holds(Guard guard) const {
@@ -103,7 +107,7 @@ bool Cell::holds(Guard guard) const {
     case Guard::NotCertified:
       return !welds;
     case Guard::ArcAllowed:
-      return job_->order.execute_weld && status_.armed && welds && !solution_->rapid.empty();
+      return job_->order.execute_weld && status_.armed && seams_known_ && welds && !solution_->rapid.empty();
     case Guard::WeldNotWanted:
       return !job_->order.execute_weld;
     case Guard::AllSeamsDone:
@@ -131,6 +135,11 @@ void Cell::act(Action action) {
       status_.fault = FaultCode::None;
       status_.fault_text.clear();
       status_.pass = 0;
+      if (weld_begun_) {
+        seams_known_ = false;
+        request(RobotTask::Stop);
+        request(RobotTask::Query);
+      }
       out_.push_back(ImportRequest{});
       break;
     case Action::Plan:
@@ -180,13 +189,21 @@ void Cell::act(Action action) {
       break;
     case Action::Weld:
       program_started_ = false;
+      weld_begun_ = true;
+      save_state();
       status_.progress = 0;
       request(RobotTask::Weld);
       break;
     case Action::Finish:
       if (status_.state == State::Done) {
-        finish_with(true, solution_ ? localize::to_string(solution_->verdict.verdict) : "done",
-                    job_->order.execute_weld ? "all seams welded" : "re-planned program uploaded, not run");
+        if (interrupted_seam_ > 0) {
+          finish_with(
+              false, "weld",
+              "all other seams are welded; seam " + std::to_string(interrupted_seam_) + " was interrupted");
+        } else {
+          finish_with(true, solution_ ? localize::to_string(solution_->verdict.verdict) : "done",
+                      job_->order.execute_weld ? "all seams welded" : "re-planned program uploaded, not run");
+        }
       } else {
         const bool judged = solution_ && solution_->verdict.verdict != localize::Verdict::Weld;
         finish_with(false, judged ? localize::to_string(solution_->verdict.verdict) : "failed",
@@ -206,7 +223,7 @@ void Cell::begin_scan() {
     guidance_done_ = true;
     status_.guide_step = 0;
     out_.push_back(ShowDrawing{});
-    out_.push_back(SaveState{status_.state, status_.seams_done, guidance_done_});
+    save_state();
   }
   ++status_.pass;
   running_frames_ = 0;

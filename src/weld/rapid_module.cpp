@@ -76,8 +76,10 @@ std::string header(const cell::CellSetup& cell, const std::string& job, std::siz
   out += "  ! Made for one part as it lay when it was measured: never run it for another.\n";
   out += "  ! Targets are absolute in the robot's base frame. Where the base frame is not the world frame,\n";
   out += "  ! write the base frame's pose into the user frame of wWeldcell.\n\n";
-  out += "  ! Seams welded so far, read by weldcelld; seams to leave out, written before the start.\n";
-  out += "  PERS num nSeamsDone:=0;\n  PERS num nSeamsToSkip:=0;\n\n";
+  out +=
+      "  ! Seams welded and seams begun so far, read by weldcelld; seams to leave out, written before the "
+      "start.\n";
+  out += "  PERS num nSeamsDone:=0;\n  PERS num nSeamsBegun:=0;\n  PERS num nSeamsToSkip:=0;\n\n";
   out += "  PERS tooldata tWeldcellTorch:=[TRUE,[" + rapid::position(tool.position_mm()) + "," +
          rapid::quaternion(tool.rotation(), like) + "],[" + number(std::max(0.1, cell.torch.mass_kg), 3) +
          "," + rapid::position({cog[0], cog[1], cog[2]}) + ",[1,0,0,0],0,0,0]];\n";
@@ -114,6 +116,7 @@ std::string seam_proc(const cell::CellSetup& cell, const TorchPath& path, const 
   std::string out = "\n  ! Weld " + comment(path.name, 80) + "\n  PROC Seam" + id + "()\n";
   out += "    MoveAbsJ j" + id + "Over," + air + ",z10" + kSuffix + "\n";
   out += "    MoveL p" + id + "Approach," + near + ",z10" + kSuffix + "\n";
+  out += "    nSeamsBegun:=nSeamsDone+1;\n";
   for (std::size_t i = 1; i <= points; ++i) {
     const bool ends = i == 1 || i == points;
     const std::string move = i == 1 ? "ArcLStart" : i == points ? "ArcLEnd" : "ArcL";
@@ -129,7 +132,7 @@ std::string seam_proc(const cell::CellSetup& cell, const TorchPath& path, const 
 
 std::string main_proc(const cell::CellSetup& cell, std::size_t seams) {
   std::string out = "\n  PROC WeldcellWeld()\n    ConfJ\\On;\n    ConfL\\On;\n    SingArea\\Off;\n";
-  out += "    nSeamsDone:=nSeamsToSkip;\n";
+  out += "    nSeamsDone:=nSeamsToSkip;\n    nSeamsBegun:=nSeamsToSkip;\n";
   for (std::size_t i = 0; i < seams; ++i) {
     out += fmt::format("    IF nSeamsToSkip<{} THEN\n      Seam{:02};\n    ENDIF\n", i + 1, i + 1);
   }

@@ -70,6 +70,7 @@ struct JobArrived {
   bool interrupted = false;
   int seams_done = 0;  ///< of an interrupted job
   bool guidance_done = false;
+  bool weld_begun = false;  ///< its weld program had been started: ask the controller how far it came
 };
 struct ImportDone {
   Result<workpiece::Workpiece> workpiece;
@@ -89,7 +90,8 @@ struct RobotReply {
   bool ok = false;
   std::string text;      ///< cause and mend when not ok
   bool running = false;  ///< of Query: RAPID executes
-  int seams_done = 0;    ///< of Query
+  int seams_done = 0;    ///< of Query: their arc is out
+  int seams_begun = 0;   ///< of Query: their arc was about to start
 };
 /// Raw data were lost before they reached the cell (a ring was full).
 struct Overrun {
@@ -137,6 +139,7 @@ struct SaveState {
   State state = State::Idle;
   int seams_done = 0;
   bool guidance_done = false;
+  bool weld_begun = false;
 };
 struct FinishJob {
   bool accepted = false;
@@ -238,6 +241,8 @@ class Cell {
   void begin_scan();
   void enter(State state);
   void watch_scan();
+  void save_state();
+  void settle_seams(const RobotReply& reply);
   void log(LogEvent::Level level, const std::string& text);
   void refresh_plc();
   std::string start_hindrance() const;
@@ -267,6 +272,9 @@ class Cell {
   std::uint64_t next_request_ = 1, awaited_request_ = 0;
   RobotTask awaited_task_ = RobotTask::Query;
   bool program_started_ = false;
+  bool weld_begun_ = false;   ///< a weld program of this job was started, perhaps by an earlier process
+  bool seams_known_ = true;   ///< false: how far that program came must be asked before the next arc
+  int interrupted_seam_ = 0;  ///< left out, to be finished by hand; 0 = none
   int running_frames_ = 0;
   HostTime state_since_, last_egm_, last_laser_, last_query_, motion_done_at_;
   bool egm_seen_ = false, motion_started_ = false, motion_finished_ = false;

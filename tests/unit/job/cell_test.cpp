@@ -30,14 +30,6 @@ std::shared_ptr<const Prepared> prepared() {
   return p;
 }
 
-std::shared_ptr<const Solution> solution(localize::Verdict verdict) {
-  auto s = std::make_shared<Solution>();
-  s->found.verdict = verdict;
-  s->verdict = {verdict, "because"};
-  s->rapid = "MODULE";
-  return s;
-}
-
 /// Drives a cell and remembers what came out.
 class Driver {
  public:
@@ -212,6 +204,29 @@ TEST(Cell, AnUnreadableWorkpieceFailsTheJobAndStaysUp) {
   EXPECT_NE(finished[0].reason.find("no units"), std::string::npos);
   EXPECT_NE(finished[0].reason.find("weld manually"), std::string::npos);
   EXPECT_TRUE(d.cell.takes_jobs());
+}
+
+TEST(Cell, ASeamWhoseArcWasBegunIsNeverWeldedAgain) {
+  Driver d;
+  d.feed(LinkChange{Link::Laser, true, ""}).feed(LinkChange{Link::Rws, true, ""});
+  JobArrived arrived;
+  arrived.id = arrived.order.name = "job";
+  arrived.interrupted = arrived.guidance_done = arrived.weld_begun = true;
+  d.feed(arrived).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Resume);
+  const auto asked = d.of<RobotRequest>(d.last);
+  ASSERT_EQ(asked.size(), 2u);
+  EXPECT_EQ(asked[0].task, RobotTask::Stop);
+  ASSERT_EQ(asked[1].task, RobotTask::Query);
+  RobotReply reply;
+  reply.id = asked[1].id;
+  reply.ok = true;
+  reply.seams_begun = 1;  // one of two, its end never reached
+  d.feed(reply);
+  EXPECT_EQ(d.cell.status().seams_done, 1);
+  const auto saved = d.of<SaveState>(d.last);
+  ASSERT_FALSE(saved.empty());
+  EXPECT_TRUE(saved.back().weld_begun);
+  EXPECT_EQ(saved.back().seams_done, 1);
 }
 
 TEST(Cell, ALateAnswerOfAnEarlierRequestMovesNothing) {

@@ -78,7 +78,7 @@ TEST(RapidModule, ReadsBackWithoutAFaultAndKeepsEveryTarget) {
 
 TEST(RapidModule, DeclaresToolAndCountersAsTheCellStatesThem) {
   const Made made;
-  for (const char* name : {"nSeamsDone", "nSeamsToSkip"}) {
+  for (const char* name : {"nSeamsDone", "nSeamsBegun", "nSeamsToSkip"}) {
     const auto* counter = made.module.find(name);
     ASSERT_TRUE(counter);
     EXPECT_EQ(counter->kind + " " + counter->type + " " + counter->text, "PERS num 0");
@@ -100,9 +100,9 @@ TEST(RapidModule, CountsASeamOnceItsArcIsOutAndSkipsThoseDone) {
   for (const auto& i : made.module.instructions) {
     if (i.routine == "Seam03") seam.push_back(i.text.substr(0, i.text.find(',')));
   }
-  EXPECT_THAT(seam,
-              ElementsAre("MoveAbsJ j03Over", "MoveL p03Approach", "ArcLStart p03_001", "ArcLEnd p03_002",
-                          "nSeamsDone:=nSeamsDone+1", "MoveL p03Retract", "MoveL p03Away"));
+  EXPECT_THAT(seam, ElementsAre("MoveAbsJ j03Over", "MoveL p03Approach", "nSeamsBegun:=nSeamsDone+1",
+                                "ArcLStart p03_001", "ArcLEnd p03_002", "nSeamsDone:=nSeamsDone+1",
+                                "MoveL p03Retract", "MoveL p03Away"));
   for (int i = 1; i <= 6; ++i) {
     EXPECT_THAT(made.text,
                 HasSubstr("IF nSeamsToSkip<" + std::to_string(i) + " THEN\n      Seam0" + std::to_string(i)));
