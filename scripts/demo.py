@@ -22,7 +22,8 @@ def parse(arguments=None):
         prog="scripts/demo",
         description="Starts weldcell-sim and weldcelld on 127.0.0.1, drops a job, lets the simulated PLC and worker run it, "
                     "and prints the found pose beside the truth, each weld's certificate and the torch's error on the true seam.")
-    parser.add_argument("--cad", default="ladder", help="ladder (STEP, default) or mitre (DXF); a file of that kind is fine too")
+    parser.add_argument("--cad", nargs="?", const="mitre", default="ladder",
+                        help="ladder (STEP, default), mitre (DXF, also for a bare --cad), or the path of such a file")
     parser.add_argument("--seeds", type=int, default=1, help="how many jobs, each with its own placement within +-15 mm, +-20 deg")
     parser.add_argument("--seed", type=int, default=1, help="the first seed")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout, nothing else")
@@ -94,8 +95,9 @@ class Demo:
         with open(os.path.join(CONFIG, f"jobs/demo-{self.part}.yaml")) as f:
             text = f.read()
         named = re.search(r"^workpiece:\s*(\S+)", text, flags=re.M).group(1)
-        self.cad = os.path.join(CONFIG, "jobs", named)
-        return text.replace(named, os.path.basename(named))
+        given = self.options.cad
+        self.cad = given if os.path.isfile(given) else os.path.normpath(os.path.join(CONFIG, "jobs", named))
+        return text.replace(named, os.path.basename(self.cad))
 
     def program(self, name):
         return os.path.join(self.options.bin, name)

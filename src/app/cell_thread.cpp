@@ -60,8 +60,8 @@ void CellThread::drain() {
     if (std::holds_alternative<job::SolveDone>(message.body) && story_) {
       story_->note_solve_time(seconds(adapters::now() - solve_asked_));
     }
-    const std::string outcome = feed(adapters::now(), std::move(message.body));
-    if (message.outcome) message.outcome->set_value(outcome);
+    feed(adapters::now(), std::move(message.body));
+    if (message.outcome) message.outcome->set_value(cell_.refusal());
   }
   thread_local EgmItem egm;
   while (wiring_.egm.pop(egm)) {
@@ -89,10 +89,9 @@ void CellThread::drain() {
   }
 }
 
-std::string CellThread::feed(HostTime time, job::InputBody body) {
+void CellThread::feed(HostTime time, job::InputBody body) {
   const job::Input input{time, std::move(body)};
   if (record_) record_->input(input);
-  last_warning_.clear();
   const job::Outputs outputs = cell_.step(input);
   if (record_) record_->outputs(time, outputs);
   if (story_) story_->note(time, outputs);
@@ -100,7 +99,6 @@ std::string CellThread::feed(HostTime time, job::InputBody body) {
   wiring_.wants_laser.store(cell_.wants_laser(), std::memory_order_relaxed);
   wiring_.takes_jobs.store(cell_.takes_jobs(), std::memory_order_relaxed);
   wiring_.publish(cell_.status());
-  return last_warning_;
 }
 
 void CellThread::dispatch(const job::Outputs& outputs) {
@@ -132,7 +130,6 @@ void CellThread::dispatch(const job::Output& output) {
     end_job(*finish);
   } else if (const auto* event = std::get_if<job::LogEvent>(&output)) {
     using Level = job::LogEvent::Level;
-    if (event->level != Level::Info) last_warning_ = event->text;
     const auto level = event->level == Level::Info      ? spdlog::level::info
                        : event->level == Level::Warning ? spdlog::level::warn
                                                         : spdlog::level::err;

@@ -20,7 +20,7 @@ class CellThread {
 
  private:
   void drain();
-  std::string feed(HostTime time, job::InputBody body);
+  void feed(HostTime time, job::InputBody body);
   void dispatch(const job::Outputs& outputs);
   void dispatch(const job::Output& output);
   void begin_job(const std::shared_ptr<const ActiveJob>& job);
@@ -40,7 +40,6 @@ class CellThread {
   std::vector<std::shared_ptr<const plan::MotionPlan>> plans_;
   std::uint64_t laser_lost_ = 0, egm_lost_ = 0;
   HostTime last_tick_, solve_asked_;
-  std::string last_warning_;
 };
 
 }  // namespace weldcell::app

@@ -72,6 +72,7 @@ Cell::Cell(const cell::CellSetup& setup, const wire::Meas28Layout& laser, bool p
 Outputs Cell::step(const Input& input) {
   now_ = input.time;
   out_.clear();
+  refusal_.clear();
   std::visit([this](const auto& body) { on(body); }, input.body);
   refresh_plc();
   return std::exchange(out_, {});

@@ -295,14 +295,15 @@ int Cell::command(wire::PlcCommand order, const std::string& who) {
   constexpr int kDone = 0, kRefused = 1, kUnknown = 2;
   const std::string name = order_name(order);
   if (name.empty()) {
-    log(LogEvent::Level::Warning,
-        "unknown command " + std::to_string(static_cast<int>(order)) + " from " + who);
+    refusal_ = "unknown command " + std::to_string(static_cast<int>(order)) + " from " + who;
+    log(LogEvent::Level::Warning, refusal_);
     return kUnknown;
   }
   log(LogEvent::Level::Info, name + " from " + who);
   const std::string hindrance = obey(order, who);
   if (hindrance.empty()) return kDone;
-  log(LogEvent::Level::Warning, name + " refused: " + hindrance);
+  refusal_ = name + " refused: " + hindrance;
+  log(LogEvent::Level::Warning, refusal_);
   return kRefused;
 }
 

@@ -219,7 +219,7 @@ def bad_jobs(bin_dir):
         name = demo.submit(99)
         folder, _ = demo.wait_for(name)
         result = json.load(open(os.path.join(folder, "result.json")))
-        check("failed" in folder and "reach" in result["reason"], f"unreachable: {result['reason']}")
+        check("failed" in folder and "cannot get there" in result["reason"] and "w1" in result["reason"], f"unreachable: {result['reason']}")
         # The same name again.
         demo.submit(99)
         begin = time.monotonic()
@@ -231,6 +231,18 @@ def bad_jobs(bin_dir):
     finally:
         demo.end(demo.daemon)
         demo.end(demo.sim)
+
+
+def udp_ports(pid):
+    """Local UDP ports of a process, from /proc."""
+    inodes = set()
+    for fd in os.listdir(f"/proc/{pid}/fd"):
+        target = os.readlink(f"/proc/{pid}/fd/{fd}")
+        if target.startswith("socket:["):
+            inodes.add(target[8:-1])
+    with open("/proc/net/udp") as f:
+        rows = [line.split() for line in f][1:]
+    return [int(row[1].split(":")[1], 16) for row in rows if row[9] in inodes]
 
 
 def hostile_datagrams(bin_dir):
@@ -254,14 +266,68 @@ def hostile_datagrams(bin_dir):
         check(demo.ask_status()["state"] == "Idle", "the daemon is not idle")
         name = demo.submit(7)
         wait_state(demo, ["Scanning"], 120)
-        # Garbage from another address while the robot is guided: no reply, no harm.
+        # Garbage to both ends while the robot is guided: no reply, no harm.
+        ports = [status["ports"]["egm"], *udp_ports(demo.sim.pid)]
+        check(len(ports) >= 2, "the simulator's EGM socket was not found")
         for _ in range(500):
-            udp.sendto(rng.randbytes(rng.choice([1, 100, 486])), ("127.0.0.1", status["ports"]["egm"]))
+            for port in ports:
+                udp.sendto(rng.randbytes(rng.choice([1, 100, 486])), ("127.0.0.1", port))
             time.sleep(0.002)
         check_good(demo, finish(demo, name))
     finally:
         demo.end(demo.daemon)
         demo.end(demo.sim)
+
+
+def alone_and_supervised(bin_dir):
+    """No robot, no laser, no PLC: stated, nothing starts; and what a service manager hears."""
+    demo = make(bin_dir)
+    folder = tempfile.mkdtemp(prefix="weldcell-notify-")
+    notify = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    notify.bind(os.path.join(folder, "notify"))
+    notify.settimeout(10)
+    heard = []
+
+    def hear(word, seconds=10):
+        begin = time.monotonic()
+        while not any(word in text for text in heard):
+            check(time.monotonic() - begin < seconds, f"never heard {word}: {heard}")
+            try:
+                heard.append(notify.recv(4096).decode())
+            except socket.timeout:
+                pass
+
+    os.environ.update(NOTIFY_SOCKET=os.path.join(folder, "notify"), WATCHDOG_USEC="2000000")
+    try:
+        demo.start_daemon()
+        hear("READY=1")
+        del heard[:]
+        hear("WATCHDOG=1")
+        name = demo.submit(8)
+        wait_state(demo, ["Ready"], 30)
+        hear("STATUS=Ready")
+        status = demo.ask_status()
+        check(not any(status["links"].values()), f"links {status['links']}")
+        check("not armed" in operate(demo, "start", expect=1), "start without an arm")
+        operate(demo, "arm")
+        check("robot controller" in operate(demo, "start", expect=1), "start without a robot")
+        check(demo.ask_status()["state"] == "Ready", "it left Ready")
+        before, begin = demo.ask_status()["cpu_seconds"], time.monotonic()
+        time.sleep(5)
+        share = (demo.ask_status()["cpu_seconds"] - before) / (time.monotonic() - begin)
+        print(f"idle: {100 * share:.1f} % of a core, {demo.ask_status()['rss_kb'] / 1024:.0f} MB resident")
+        operate(demo, "abort")
+        begin = time.monotonic()
+        while not demo.place_of(name):
+            check(time.monotonic() - begin < 10, "the aborted job was not put away")
+            time.sleep(0.1)
+        demo.end(demo.daemon)
+        hear("STOPPING=1")
+        check(demo.daemon.returncode == 0, f"it ended with {demo.daemon.returncode}")
+    finally:
+        demo.end(demo.daemon)
+        for key in ("NOTIFY_SOCKET", "WATCHDOG_USEC"):
+            os.environ.pop(key, None)
 
 
 def trials(bin_dir):

@@ -198,6 +198,8 @@ class Cell {
   Outputs step(const Input& input);
 
   const CellStatus& status() const { return status_; }
+  /// Why the command of the last step was not obeyed; empty when it was, or when there was none.
+  const std::string& refusal() const { return refusal_; }
   CellMemory memory() const;
   /// Before the first step only.
   void recall(const CellMemory& memory);
@@ -261,7 +263,7 @@ class Cell {
   std::shared_ptr<const NextPass> next_pass_;
   std::shared_ptr<const Solution> solution_;
   std::shared_ptr<ScanRecord> scan_;
-  std::string failure_;
+  std::string failure_, refusal_;
   State resume_state_ = State::Idle;
   bool resuming_ = false;
   bool guidance_done_ = false;
