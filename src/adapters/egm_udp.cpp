@@ -34,7 +34,7 @@ Result<EgmSocket> EgmSocket::bind(const std::string& host, int port, const std::
   }
   local.sin_port = htons(static_cast<std::uint16_t>(port));
 
-  out.fd_ = Fd(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  out.fd_ = Fd(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   if (!out.fd_.valid() ||
       ::bind(out.fd_.get(), reinterpret_cast<const sockaddr*>(&local), sizeof local) != 0) {
     const int reason = errno;
@@ -62,58 +62,70 @@ bool EgmSocket::admits(const sockaddr_in& sender, HostTime arrival) noexcept {
   return true;
 }
 
-EgmSocket::Take EgmSocket::take(std::span<std::byte> buffer, EgmArrival& out) noexcept {
-  sockaddr_in sender{};
-  const StampedRead read =
-      read_stamped(fd_.get(), scratch_, reinterpret_cast<sockaddr*>(&sender), sizeof sender);
-  if (read.bytes < 0) {
-    if (errno == EAGAIN || errno == EWOULDBLOCK) return Take::Empty;
+void EgmSocket::set_timeout(Nanoseconds timeout) noexcept {
+  // Zero would mean for ever.
+  timeout = std::max<Nanoseconds>(timeout, kMicrosecond);
+  if (timeout == timeout_) return;
+  const timeval limit{timeout / kSecond, (timeout % kSecond) / kMicrosecond};
+  if (::setsockopt(fd_.get(), SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit) == 0) timeout_ = timeout;
+}
+
+unsigned EgmSocket::take(unsigned most, int flags, std::span<std::byte> buffer, EgmArrival& out) noexcept {
+  std::array<StampedMessage, kBatch> stamped;
+  std::array<sockaddr_in, kBatch> senders;
+  std::array<mmsghdr, kBatch> messages;
+  for (unsigned i = 0; i < most; ++i)
+    messages[i].msg_hdr =
+        stamped[i].header(scratch_[i], reinterpret_cast<sockaddr*>(&senders[i]), sizeof senders[i]);
+  const int count = ::recvmmsg(fd_.get(), messages.data(), most, flags, nullptr);
+  if (count < 0) {
+    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR) return 0;
     ++counters_.receive_errors;
-    return Take::Skipped;
+    return 1;
   }
-  const auto bytes = static_cast<std::size_t>(read.bytes);
-  if (bytes == 0 || bytes > buffer.size() || (read.flags & MSG_TRUNC) != 0) {
-    ++counters_.oversize;
-    return Take::Skipped;
+  for (unsigned i = 0; i < static_cast<unsigned>(count); ++i) {
+    const std::size_t bytes = messages[i].msg_len;
+    if (bytes == 0 || bytes > buffer.size() || (messages[i].msg_hdr.msg_flags & MSG_TRUNC) != 0) {
+      ++counters_.oversize;
+      continue;
+    }
+    const HostTime arrival = arrival_of(messages[i].msg_hdr).at;
+    if (!admits(senders[i], arrival)) {
+      ++counters_.foreign;
+      continue;
+    }
+    ++(out ? counters_.superseded : counters_.received);
+    std::memcpy(buffer.data(), scratch_[i].data(), bytes);
+    out = {bytes, arrival};
   }
-  if (!admits(sender, read.arrival)) {
-    ++counters_.foreign;
-    return Take::Skipped;
+  return static_cast<unsigned>(count);
+}
+
+EgmArrival EgmSocket::receive_of(unsigned batch, std::span<std::byte> buffer, Nanoseconds timeout) noexcept {
+  constexpr unsigned kMostDrained = 64;
+  set_timeout(timeout);
+  EgmArrival out;
+  HostTime deadline{-1};
+  // Sleeps in the kernel for the first datagram and takes what has queued up behind it in the same call.
+  unsigned taken = take(batch, MSG_WAITFORONE, buffer, out);
+  while (taken > 0 && !out) {
+    // A flood of foreign datagrams must not hold the thread beyond its time.
+    const HostTime at = now();
+    if (deadline.ns < 0) deadline = at + timeout;
+    if (at >= deadline) return out;
+    taken = take(batch, MSG_WAITFORONE, buffer, out);
   }
-  std::memcpy(buffer.data(), scratch_.data(), bytes);
-  out = {bytes, read.arrival};
-  return Take::Datagram;
+  for (unsigned sum = taken; batch > 1 && taken == batch && sum < kMostDrained; sum += taken)
+    taken = take(batch, MSG_DONTWAIT, buffer, out);
+  return out;
 }
 
 EgmArrival EgmSocket::receive(std::span<std::byte> buffer, Nanoseconds timeout) noexcept {
-  const HostTime deadline = now() + timeout;
-  EgmArrival out;
-  for (;;) {
-    switch (take(buffer, out)) {
-      case Take::Datagram:
-        ++counters_.received;
-        return out;
-      case Take::Skipped:
-        // A flood of foreign datagrams must not hold the thread beyond its time.
-        if (now() >= deadline) return {};
-        break;
-      case Take::Empty:
-        if (!wait_readable(fd_.get(), deadline)) return {};
-        break;
-    }
-  }
+  return receive_of(1, buffer, timeout);
 }
 
 EgmArrival EgmSocket::receive_newest(std::span<std::byte> buffer, Nanoseconds timeout) noexcept {
-  constexpr int kMostDrained = 64;
-  EgmArrival out = receive(buffer, timeout);
-  if (!out) return out;
-  for (int i = 0; i < kMostDrained; ++i) {
-    const Take taken = take(buffer, out);
-    if (taken == Take::Empty) break;
-    if (taken == Take::Datagram) ++counters_.superseded;
-  }
-  return out;
+  return receive_of(kBatch, buffer, timeout);
 }
 
 bool EgmSocket::reply(std::span<const std::byte> datagram) noexcept {

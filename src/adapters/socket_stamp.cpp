@@ -1,42 +1,49 @@
 #include "socket_stamp.hpp"
 
 #include <poll.h>
-#include <sys/uio.h>
 
 #include <algorithm>
 #include <cstring>
-#include <ctime>
 
 #include "weldcell/adapters/host_clock.hpp"
 
 namespace weldcell::adapters {
 
-StampedRead read_stamped(int fd, std::span<std::byte> buffer, sockaddr* sender,
-                         socklen_t sender_bytes) noexcept {
-  alignas(cmsghdr) char control[CMSG_SPACE(sizeof(std::timespec))];
-  iovec piece{buffer.data(), buffer.size()};
-  msghdr message{};
-  message.msg_name = sender;
-  message.msg_namelen = sender_bytes;
-  message.msg_iov = &piece;
-  message.msg_iovlen = 1;
-  message.msg_control = control;
-  message.msg_controllen = sizeof control;
+msghdr StampedMessage::header(std::span<std::byte> buffer, sockaddr* sender,
+                              socklen_t sender_bytes) noexcept {
+  piece_ = {buffer.data(), buffer.size()};
+  msghdr out{};
+  out.msg_name = sender;
+  out.msg_namelen = sender_bytes;
+  out.msg_iov = &piece_;
+  out.msg_iovlen = 1;
+  out.msg_control = control_;
+  out.msg_controllen = sizeof control_;
+  return out;
+}
 
-  StampedRead out;
-  out.bytes = ::recvmsg(fd, &message, MSG_DONTWAIT);
-  if (out.bytes < 0) return out;
-  out.flags = message.msg_flags;
+Stamp arrival_of(msghdr& message) noexcept {
   for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
     if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS) continue;
     std::timespec stamp{};
     std::memcpy(&stamp, CMSG_DATA(c), sizeof stamp);
     if (stamp.tv_sec == 0 && stamp.tv_nsec == 0) continue;
-    out.arrival = from_realtime(stamp);
-    out.kernel_stamp = true;
-    return out;
+    return {from_realtime(stamp), true};
   }
-  out.arrival = now();
+  return {now(), false};
+}
+
+StampedRead read_stamped(int fd, std::span<std::byte> buffer, sockaddr* sender,
+                         socklen_t sender_bytes) noexcept {
+  StampedMessage stamped;
+  msghdr message = stamped.header(buffer, sender, sender_bytes);
+  StampedRead out;
+  out.bytes = ::recvmsg(fd, &message, MSG_DONTWAIT);
+  if (out.bytes < 0) return out;
+  out.flags = message.msg_flags;
+  const Stamp stamp = arrival_of(message);
+  out.arrival = stamp.at;
+  out.kernel_stamp = stamp.of_kernel;
   return out;
 }
 

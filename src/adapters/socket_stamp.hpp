@@ -3,13 +3,32 @@
 
 #include <sys/socket.h>
 #include <sys/types.h>
+#include <sys/uio.h>
 
 #include <cstddef>
+#include <ctime>
 #include <span>
 
 #include "weldcell/base/time.hpp"
 
 namespace weldcell::adapters {
+
+/// Room for the control data of one message, and the header to receive it with.
+class StampedMessage {
+ public:
+  msghdr header(std::span<std::byte> buffer, sockaddr* sender, socklen_t sender_bytes) noexcept;
+
+ private:
+  alignas(cmsghdr) char control_[CMSG_SPACE(sizeof(std::timespec))];
+  iovec piece_;
+};
+
+struct Stamp {
+  HostTime at;
+  bool of_kernel = false;  ///< false: the time of reading
+};
+/// When the kernel had the message just received with this header.
+Stamp arrival_of(msghdr& message) noexcept;
 
 struct StampedRead {
   ssize_t bytes = -1;         ///< as recvmsg returns it

@@ -45,11 +45,11 @@ class EgmSocket {
   static Result<EgmSocket> bind(const std::string& host, int port, const std::string& peer = "");
 
   int port() const noexcept { return port_; }
-  /// For poll() beside other descriptors.
   int fd() const noexcept { return fd_.get(); }
 
   /// Waits at most `timeout` for one datagram of the peer and copies it to `buffer` (kEgmDatagramBytes).
-  /// Foreign, empty and oversize ones are counted and skipped.
+  /// Foreign, empty and oversize ones are counted and skipped; while they keep coming it may take twice the
+  /// timeout.
   EgmArrival receive(std::span<std::byte> buffer, Nanoseconds timeout) noexcept;
   /// The same, but what is already queued behind the datagram is read too and only the newest is returned.
   EgmArrival receive_newest(std::span<std::byte> buffer, Nanoseconds timeout) noexcept;
@@ -62,9 +62,13 @@ class EgmSocket {
   const EgmSocketCounters& counters() const noexcept { return counters_; }
 
  private:
-  enum class Take { Datagram, Skipped, Empty };
+  static constexpr unsigned kBatch = 4;
   EgmSocket() = default;
-  Take take(std::span<std::byte> buffer, EgmArrival& out) noexcept;
+  EgmArrival receive_of(unsigned batch, std::span<std::byte> buffer, Nanoseconds timeout) noexcept;
+  /// Reads up to `most` datagrams in one call of the kernel; leaves the newest of the peer in `buffer`.
+  /// Returns how many there were of any kind.
+  unsigned take(unsigned most, int flags, std::span<std::byte> buffer, EgmArrival& out) noexcept;
+  void set_timeout(Nanoseconds timeout) noexcept;
   bool admits(const sockaddr_in& sender, HostTime arrival) noexcept;
 
   Fd fd_;
@@ -75,7 +79,8 @@ class EgmSocket {
   bool has_peer_ = false;
   HostTime peer_heard_;
   EgmSocketCounters counters_;
-  std::array<std::byte, kEgmDatagramBytes> scratch_{};
+  Nanoseconds timeout_ = 0;  ///< as the kernel has it
+  std::array<std::array<std::byte, kEgmDatagramBytes>, kBatch> scratch_{};
 };
 
 }  // namespace weldcell::adapters
