@@ -1,5 +1,5 @@
-// ABB Robot Web Services 1.0 as calls: state, motors, program, files, modules, symbols. Over any carrier; one
-// thread at a time.
+// ABB Robot Web Services as calls, the same for both generations: state, motors, program, files, modules,
+// symbols, signals, event log, subscriptions. Over any carrier; one thread at a time.
 #pragma once
 
 #include <array>
@@ -10,35 +10,17 @@
 
 #include "weldcell/base/result.hpp"
 #include "weldcell/ports/http.hpp"
+#include "weldcell/wire/rws_replies.hpp"
+#include "weldcell/wire/rws_requests.hpp"
 
 namespace weldcell::adapters {
 
-enum class ControllerState : std::uint8_t {
-  Unknown,
-  Init,
-  MotorsOff,
-  MotorsOn,
-  GuardStop,
-  EmergencyStop,
-  EmergencyStopReset,
-  SystemFailure
-};
-enum class OperationMode : std::uint8_t {
-  Unknown,
-  Init,
-  ChangingToAuto,
-  ChangingToManualFull,
-  ManualReduced,
-  ManualFull,
-  Auto
-};
-enum class ExecutionState : std::uint8_t { Unknown, Stopped, Running };
-enum class MastershipDomain : std::uint8_t { Cfg, Motion, Rapid };
-
-const char* to_string(ControllerState);
-const char* to_string(OperationMode);
-const char* to_string(ExecutionState);
-const char* to_string(MastershipDomain);
+using wire::ControllerState;
+using wire::ExecutionState;
+using wire::MastershipDomain;
+using wire::OperationMode;
+using wire::RwsGeneration;
+using wire::to_string;
 
 /// One entry of the controller's event log.
 struct ControllerEvent {
@@ -51,6 +33,17 @@ struct ControllerEvent {
 struct SystemInfo {
   std::string name, rapid_version, system_id;  ///< rapid_version is RobotWare's, e.g. "6.16.0163"
   std::vector<std::string> options;
+};
+
+struct IoSignal {
+  std::string name, type;  ///< type DI, DO, AI, AO, GI, GO
+  std::string place;       ///< "net/device/name", or the bare name, to read and write it by
+  std::string value;
+};
+
+struct SymbolFound {
+  std::string url;   ///< "RAPID/T_ROB1/Module/name"
+  std::string type;  ///< "num", "robtarget", ...
 };
 
 class RwsClient;
@@ -76,11 +69,14 @@ class MastershipLease {
 /// Every error carries a code "rws.<kind>": held, no_mastership, rejected, not_allowed, bad_value,
 /// wrong_state, bad_module, not_found, no_path, bad_signal, overloaded, unexpected (a body or status that the
 /// protocol does not have), mismatch (read-back); or the carrier's "http.*". `what` quotes the controller's
-/// own message, `mend` says what to do.
+/// own message and code, `mend` says what to do.
 class RwsClient {
  public:
   /// The carrier must outlive the client.
-  explicit RwsClient(ports::HttpTransport& transport) : transport_(&transport) {}
+  explicit RwsClient(ports::HttpTransport& transport, RwsGeneration generation = RwsGeneration::One)
+      : transport_(&transport), dialect_(generation) {}
+  RwsGeneration generation() const { return dialect_.generation(); }
+  const wire::RwsDialect& dialect() const { return dialect_; }
 
   Result<SystemInfo> system();
   Result<ControllerState> controller_state();
@@ -90,6 +86,8 @@ class RwsClient {
 
   /// Motors on needs automatic mode.
   Status set_motors(bool on);
+  /// Generation 2 needs mastership of rapid.
+  Status set_speed_ratio_percent(int percent);
   /// Starts execution from the program pointer, in every task. `forever` repeats main, otherwise one cycle.
   Status start(bool forever = false);
   Status stop();
@@ -101,8 +99,10 @@ class RwsClient {
   Status release_mastership(MastershipDomain domain);
   Result<MastershipLease> lease(MastershipDomain domain);
 
-  /// Writes a file on the controller, e.g. "$home/weldcell/job.mod", and reads it back: "rws.mismatch" unless
-  /// every byte is equal.
+  /// Where the file of a program module of that name belongs: "$home/x.mod" or "HOME/x.modx".
+  std::string module_path(std::string_view module) const { return dialect_.module_path(module); }
+  /// Writes a file on the controller, e.g. to module_path(), and reads it back: "rws.mismatch" unless every
+  /// byte is equal.
   Status upload_file(std::string_view path, std::string_view text);
   Result<std::string> download_file(std::string_view path);
   Status delete_file(std::string_view path);
@@ -111,25 +111,39 @@ class RwsClient {
   Status load_module(std::string_view task, std::string_view path, bool replace = true);
   Status unload_module(std::string_view task, std::string_view module);
   Result<std::vector<std::string>> modules(std::string_view task);
+  Result<std::string> module_text(std::string_view task, std::string_view module);
 
   /// Values are RAPID literals: "[[1,2,3],[1,0,0,0]]", "TRUE", "\"text\"".
   Result<std::string> read_symbol(std::string_view task, std::string_view module, std::string_view symbol);
   Status write_symbol(std::string_view task, std::string_view module, std::string_view symbol,
                       std::string_view literal);
+  /// Data whose name matches the regular expression, in a module or (empty) anywhere in the task.
+  Result<std::vector<SymbolFound>> search_symbols(std::string_view task, std::string_view module,
+                                                  std::string_view pattern);
+
+  /// Every signal, all pages of the list.
+  Result<std::vector<IoSignal>> signals();
+  /// By its place in signals(); generation 1 also takes the bare name.
+  Result<std::string> read_signal(std::string_view place);
+  Status write_signal(std::string_view place, std::string_view value);
 
   /// Measured axes in degrees.
   Result<std::array<double, 6>> joints_deg(std::string_view mechanical_unit = "ROB_1");
   /// The newest `count` entries, newest first.
   Result<std::vector<ControllerEvent>> event_log(int count = 20);
+  Result<ControllerEvent> event(std::uint32_t number);
+
+  /// Creates a subscription; its WebSocket is the caller's matter.
+  Result<wire::RwsSubscribed> subscribe(const std::vector<wire::RwsResource>& resources);
+  Status unsubscribe(std::string_view group);
 
  private:
-  Result<ports::HttpReply> get(std::string path);
-  Result<ports::HttpReply> post(std::string path, std::string body);
-  Result<ports::HttpReply> checked(ports::HttpRequest request);
-  Result<std::string> field(std::string path, std::string_view type, std::string_view name);
-  Status command(std::string path, std::string body);
+  Result<ports::HttpReply> checked(wire::RwsAsk ask);
+  Result<std::string> field(wire::RwsAsk ask, std::string_view type, std::string_view name);
+  Status command(wire::RwsAsk ask);
 
   ports::HttpTransport* transport_;
+  wire::RwsDialect dialect_;
 };
 
 }  // namespace weldcell::adapters

@@ -13,6 +13,7 @@ struct HttpRequest {
   std::string path;    ///< with query, from the root: "/rw/panel/ctrlstate?json=1"
   std::string body;
   std::string content_type = "application/x-www-form-urlencoded";
+  std::string accept = {};  ///< "" sends none
 };
 
 struct HttpReply {
