@@ -7,7 +7,8 @@ find_package(spdlog REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(pugixml REQUIRED)
-find_package(Poco REQUIRED COMPONENTS Foundation Net NetSSL Util)
+find_package(OpenSSL 3 REQUIRED)
+find_package(Poco REQUIRED COMPONENTS Foundation Net NetSSL Crypto Util)
 find_package(Protobuf REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(MODBUS REQUIRED IMPORTED_TARGET libmodbus)
@@ -18,7 +19,7 @@ pkg_check_modules(SDL2 REQUIRED IMPORTED_TARGET sdl2)
 # What adapters and simulator may touch the world with; the core never links it.
 add_library(weldcell_devices INTERFACE)
 target_link_libraries(weldcell_devices INTERFACE
-  Poco::Net Poco::Foundation pugixml::pugixml PkgConfig::MODBUS PkgConfig::SYSTEMD
+  Poco::NetSSL Poco::Crypto Poco::Net Poco::Foundation OpenSSL::SSL OpenSSL::Crypto pugixml::pugixml PkgConfig::MODBUS PkgConfig::SYSTEMD
   PkgConfig::CAIRO PkgConfig::SDL2 Threads::Threads)
 
 # The EGM messages, generated as protobuf-lite into the build tree.

@@ -86,8 +86,44 @@ void read_egm(Map& map, CellConfig& config) {
   map.finish();
 }
 
+namespace {
+
+/// "AB:CD:..." or "abcd...", 32 bytes.
+void read_fingerprint(Map& map, std::string& fingerprint) {
+  const char* const key = "certificate_sha256";
+  std::string text, digits;
+  if (!map.text(key, text)) return;
+  bool good = true;
+  for (const char c : text) {
+    if (c == ':') continue;
+    const char small = c >= 'A' && c <= 'F' ? static_cast<char>(c - 'A' + 'a') : c;
+    good = good && ((small >= '0' && small <= '9') || (small >= 'a' && small <= 'f'));
+    digits += small;
+  }
+  if (good && digits.size() == 64) {
+    fingerprint = digits;
+  } else {
+    map.fault(key, "'" + text + "' is no SHA-256 fingerprint",
+              "64 hexadecimal digits, with or without colons: openssl x509 -noout -fingerprint -sha256");
+  }
+}
+
+}  // namespace
+
 void read_rws(Map& map, CellConfig& config) {
   read_endpoint(map, "address", config.rws, true);
+  static constexpr Choice<RwsGenerationChoice> kGenerations[] = {
+      {"1", RwsGenerationChoice::One}, {"2", RwsGenerationChoice::Two}, {"auto", RwsGenerationChoice::Auto}};
+  map.choice("generation", config.rws_generation, kGenerations);
+  read_fingerprint(map, config.rws_certificate_sha256);
+  if (config.rws_generation == RwsGenerationChoice::Two && !map.has("certificate_sha256")) {
+    map.fault("certificate_sha256", "is missing: generation 2 talks TLS with a certificate of its own making",
+              "read its fingerprint at the controller and write it here (docs/OPERATING.md)");
+  }
+  if (config.rws_generation == RwsGenerationChoice::One && map.has("certificate_sha256")) {
+    map.fault("certificate_sha256", "stands beside generation 1, which has no TLS",
+              "write generation: 2 or auto, or leave it out");
+  }
   map.text("user", config.rws_user);
   map.text("password_file", config.rws_password_file);
   map.text("task", config.rws_task);

@@ -6,6 +6,7 @@
 
 #include "sim/controller_state.hpp"
 #include "sim/rws_handler.hpp"
+#include "sim/rws_observe.hpp"
 
 namespace weldcell::sim {
 
@@ -16,6 +17,7 @@ constexpr std::size_t kMaxEvents = 1000;
 constexpr int kStatementsPerCycle = 64;
 constexpr double kBrakeTime_s = 0.15;
 constexpr double kTraceStep_mm = 0.2;
+constexpr double kRestart_s = 5;
 }  // namespace
 
 const char* to_string(PanelState state) {
@@ -44,6 +46,13 @@ ControllerState::ControllerState(const Scene& scene, const kinematics::ArmModel&
       servo(cycle_s, scene.controller.dead_time_ms * 1e-3, scene.cell.setup.home),
       reference(scene.cell.setup.home) {
   path.reset(reference);
+  generation = truth.rws_generation != 0                                      ? truth.rws_generation
+               : scene.cell.rws_generation == files::RwsGenerationChoice::Two ? 2
+                                                                              : 1;
+  for (int i = 1; i <= 120; ++i) {
+    const std::string number = std::to_string(i);
+    idle_signals["doSpare" + std::string(3 - number.size(), '0') + number] = 0;
+  }
   memory.set_machine_function([this](const std::string& name, const std::vector<rapid::Value>& arguments) {
     return machine_function(name, arguments);
   });
@@ -110,6 +119,43 @@ void ControllerState::start_ramp(double duration_s) {
   drive = Drive::Ramp;
   ramp_speed = reference_speed;
   ramp_left_s = ramp_total_s = moving ? std::max(duration_s, cycle_s) : cycle_s;
+}
+
+void ControllerState::set_auto(bool automatic) {
+  if (automatic == truth.auto_mode) return;
+  truth.auto_mode = automatic;
+  stop_program("operating mode changed");
+  if (panel == PanelState::MotorsOn) set_panel(PanelState::MotorsOff);
+  log(1, automatic ? 10017 : 10015, automatic ? "Automatic mode confirmed" : "Manual mode selected");
+}
+
+void ControllerState::restart(double duration_s) {
+  stop_program("controller restart");
+  set_panel(PanelState::MotorsOff);
+  egm.end();
+  egm_interrupted = false;
+  task.clear_pointer();
+  mastership.clear();
+  ++restarts;
+  fault_until_s["restart"] = seconds(now.ns) + (duration_s > 0 ? duration_s : kRestart_s);
+}
+
+std::vector<std::pair<std::string, double>> ControllerState::signals() {
+  std::vector<std::pair<std::string, double>> out;
+  for (const char* name :
+       {"doArcOn", "doGasOn", "doWireFeed", "doJobDone", "diArcEstablished", "diGateClosed"}) {
+    out.emplace_back(name, memory.symbol("", rapid::lower(name))->value.number);
+  }
+  out.insert(out.end(), idle_signals.begin(), idle_signals.end());
+  return out;
+}
+
+void ControllerState::set_signal(const std::string& name, double value) {
+  if (const auto idle = idle_signals.find(name); idle != idle_signals.end()) {
+    idle->second = value;
+  } else {
+    memory.symbol("", rapid::lower(name))->value.number = value;
+  }
 }
 
 bool ControllerState::start_program(bool forever) {
@@ -217,6 +263,11 @@ void ControllerState::step(HostTime t) {
     }
     if (fault->first == "estop") set_panel(PanelState::EmergencyStopReset);
     if (fault->first == "guardstop") set_panel(PanelState::MotorsOff);
+    if (fault->first == "manual") set_auto(true);
+    if (fault->first == "restart") {
+      started_at = now;
+      log(1, 10002, "Controller has been restarted");
+    }
     fault = fault_until_s.erase(fault);
   }
   if (task.running()) {
@@ -227,7 +278,7 @@ void ControllerState::step(HostTime t) {
   servo.step(now, reference);
   record_weld();
   datagram.reset();
-  if (egm.frame_due() && !fault_until_s.contains("egm_silence")) datagram = egm_frame();
+  if (egm.frame_due() && !fault_until_s.contains("egm_silence") && !restarting()) datagram = egm_frame();
   if (seconds(now.ns) >= complaint_after_s) {
     if (const std::string complaint = egm.take_complaint(); !complaint.empty()) {
       log(2, 41821, "Inbound UdpUc message invalid", complaint);
@@ -276,6 +327,11 @@ bool Controller::inject(const std::string& fault, double duration_s) {
     s.set_panel(PanelState::MotorsOff);
   } else if (fault == "program_stop") {
     s.stop_program("stopped at the pendant");
+  } else if (fault == "manual") {
+    s.set_auto(false);
+    if (duration_s > 0) s.fault_until_s[fault] = until;
+  } else if (fault == "restart") {
+    s.restart(duration_s);
   } else if (fault == "egm_silence" || fault == "rws_503") {
     s.fault_until_s[fault] = until;
   } else {
@@ -288,6 +344,13 @@ Status Controller::load_module(const std::string& text) {
   if (auto loaded = state_->memory.load(text, true); !loaded) return loaded.error();
   return Done{};
 }
+
+std::optional<RwsObserved> Controller::observe_rws(const std::string& uri) {
+  return rws_observed(*state_, uri);
+}
+int Controller::rws_generation() const { return state_->generation; }
+bool Controller::restarting() const { return state_->restarting(); }
+std::uint64_t Controller::restarts() const { return state_->restarts; }
 
 bool Controller::motors_on() const { return state_->motors_on(); }
 bool Controller::program_running() const { return state_->task.running(); }

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,14 @@ struct ControllerState final : rapid::Machine {
   void stop_program(const std::string& why);
   /// RAPID runs, or the arm still ramps to rest after it: what Robot Web Services call running.
   bool executing() const { return task.running() || drive == Drive::Ramp; }
+  /// The key on the cabinet: the program stops and the motors go off when it turns.
+  void set_auto(bool automatic);
+  /// Warm start: program stopped, motors off, EGM ended, mastership gone; RWS is away for a while.
+  void restart(double duration_s);
+  bool restarting() const { return fault_until_s.contains("restart"); }
+  /// Name and value of every I/O signal, in order: the cell's own, then idle ones as on any real cabinet.
+  std::vector<std::pair<std::string, double>> signals();
+  void set_signal(const std::string& name, double value);
   void log(int type, int code, const std::string& title, const std::string& text = "");
   bool motors_on() const { return panel == PanelState::MotorsOn; }
   std::int64_t device_us(HostTime t) const;
@@ -82,6 +91,11 @@ struct ControllerState final : rapid::Machine {
   std::uint64_t programs_ended = 0;
   std::map<std::string, int> mastership;     ///< domain -> session that holds it
   std::map<std::string, std::string> files;  ///< $HOME, lower-case path -> content
+  std::set<std::string> folders;             ///< below $HOME, lower-case paths
+  int generation = 1;                        ///< of RWS
+  std::uint64_t restarts = 0;
+  HostTime started_at;
+  std::map<std::string, double> idle_signals;
 };
 
 }  // namespace weldcell::sim

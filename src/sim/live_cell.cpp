@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 namespace weldcell::sim {
 
@@ -23,6 +24,25 @@ void sleep_until(HostTime t) {
 
 }  // namespace
 
+namespace {
+
+RwsServerOptions rws_options(const Scene& scene, const LiveOptions& options) {
+  RwsServerOptions out;
+  out.endpoint = scene.cell.rws;
+  out.user = scene.controller.user;
+  out.password = scene.controller.password;
+  out.seed = scene.seed;
+  out.requests_per_s = scene.controller.rws_requests_per_s;
+  if (!options.certificate_file.empty()) {
+    auto kept = TlsIdentity::keep(options.certificate_file);
+    if (!kept.ok()) throw std::runtime_error(kept.error().text());
+    out.identity = std::move(*kept);
+  }
+  return out;
+}
+
+}  // namespace
+
 LiveCell::LiveCell(Scene scene, LiveOptions options)
     : scene_(std::move(scene)),
       options_(std::move(options)),
@@ -30,8 +50,7 @@ LiveCell::LiveCell(Scene scene, LiveOptions options)
       laser_(scene_),
       egm_(scene_.cell.egm),
       laser_server_(scene_.cell.laser),
-      rws_(scene_.cell.rws, scene_.controller.user, scene_.controller.password, scene_.seed, controller_,
-           lock_),
+      rws_(rws_options(scene_, options_), controller_, lock_),
       faults_(scene_.faults.begin(), scene_.faults.end()) {
   if (options_.plc) {
     plc_ = std::make_unique<PlcLink>(scene_.cell.modbus, scene_.cell.word_order,
@@ -43,7 +62,9 @@ std::string LiveCell::ports_json() const {
   const nlohmann::ordered_json out{{"egm", scene_.cell.egm.port},
                                    {"rws", rws_.port()},
                                    {"laser", laser_server_.port()},
-                                   {"modbus", scene_.cell.modbus.port}};
+                                   {"modbus", scene_.cell.modbus.port},
+                                   {"rws_generation", controller_.rws_generation()},
+                                   {"rws_certificate_sha256", rws_.fingerprint()}};
   return out.dump();
 }
 

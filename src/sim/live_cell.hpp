@@ -19,6 +19,7 @@ struct LiveOptions {
   std::string truth_file;
   bool plc = true;
   bool plc_rearm = false;
+  std::string certificate_file;  ///< PEM of RWS 2.0, made when absent; "" makes a new one at every start
 };
 
 class LiveCell {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "sim/live_cell.hpp"
+#include "sim/tls_identity.hpp"
 
 namespace {
 
@@ -29,10 +30,16 @@ constexpr const char* kUsage =
     "  --seed N           overrides the scene's seed\n"
     "  --fault SPEC       KIND[@[scan+]SECONDS][:DURATION], may be repeated; KIND is laser_drop, "
     "laser_stall, egm_silence,\n"
-    "                     estop, guardstop, motors_off, program_stop or rws_503; e.g. laser_drop@scan+5:2\n"
+    "                     estop, guardstop, motors_off, manual, program_stop, restart or rws_503; e.g. "
+    "laser_drop@scan+5:2\n"
     "  --no-plc           without the simulated PLC\n"
     "  --plc-rearm        the simulated worker also clears faults, arms again and resumes\n"
-    "  --ports-file FILE  writes the ports in use as JSON\n"
+    "  --ports-file FILE  writes the ports in use as JSON, with the fingerprint of RWS 2.0's certificate\n"
+    "  --certificate FILE key and certificate of RWS 2.0 as PEM, made when it does not exist; without it a "
+    "new\n"
+    "                     one is made at every start\n"
+    "  --make-certificate FILE   makes that file, prints its SHA-256 fingerprint for the cell file, and "
+    "ends\n"
     "\n"
     "exit codes: 0 ended by a signal, 2 bad input or usage, 3 an address cannot be had\n";
 
@@ -68,6 +75,8 @@ std::optional<Options> parse(int count, char** words) {
       out.scene = value;
     } else if (word == "--truth") {
       out.live.truth_file = value;
+    } else if (word == "--certificate") {
+      out.live.certificate_file = value;
     } else if (word == "--ports-file") {
       out.ports_file = value;
     } else if (word == "--seed") {
@@ -111,6 +120,12 @@ int main(int count, char** words) {
   if (count == 2 && (std::strcmp(words[1], "--help") == 0 || std::strcmp(words[1], "-h") == 0)) {
     std::fputs(kUsage, stdout);
     return 0;
+  }
+  if (count == 3 && std::strcmp(words[1], "--make-certificate") == 0) {
+    const auto kept = sim::TlsIdentity::keep(words[2]);
+    if (!kept.ok()) std::fprintf(stderr, "weldcell-sim: %s\n", kept.error().text().c_str());
+    if (kept.ok()) std::printf("%s\n", kept->fingerprint().c_str());
+    return kept.ok() ? 0 : 2;
   }
   const auto options = parse(count, words);
   if (!options) return 2;

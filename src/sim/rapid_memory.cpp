@@ -138,6 +138,15 @@ Datum* Memory::symbol(const std::string& module, const std::string& name) {
   return found == data->second.end() ? nullptr : &found->second;
 }
 
+std::vector<std::pair<std::string, const Datum*>> Memory::data_of(const std::string& module) const {
+  std::vector<std::pair<std::string, const Datum*>> out;
+  for (const auto& [owner, data] : data_) {
+    if (!module.empty() && owner != module) continue;
+    for (const auto& [name, datum] : data) out.emplace_back(name, &datum);
+  }
+  return out;
+}
+
 const Routine* Memory::routine(const std::string& module, const std::string& name) const {
   if (const auto own = modules_.find(module); own != modules_.end()) {
     if (const auto found = own->second->routines.find(name); found != own->second->routines.end()) {

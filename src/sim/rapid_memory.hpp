@@ -62,6 +62,8 @@ class Memory {
   Datum* find(const Scope& scope, const std::string& name);
   /// Data by module and name as RWS addresses it; an empty module finds predefined data.
   Datum* symbol(const std::string& module, const std::string& name);
+  /// Data of a module, or of all modules when it is empty, in the order of their names.
+  std::vector<std::pair<std::string, const Datum*>> data_of(const std::string& module) const;
   const Routine* routine(const std::string& module, const std::string& name) const;
   void define(const std::string& display, const std::string& type, Value value,
               Storage storage = Storage::Constant);

@@ -1,8 +1,9 @@
-// RWS 1.0 requests answered from the simulated controller's state: XHTML, or JSON with ?json=1. No sockets.
-// Pure.
+// RWS requests of both generations answered from the simulated controller's state. Generation 2 is brought
+// into the paths and actions of generation 1, so that one controller stands behind both. No sockets. Pure.
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,6 +26,7 @@ inline constexpr long kRwsNoResource = -1073414146;
 inline constexpr long kRwsBadSignal = -1073445866;
 inline constexpr long kRwsNoPath = -1073438713;
 inline constexpr long kRwsBadModulePath = -1073438708;
+inline constexpr long kRwsBadVolume = -1073438716;
 
 class RwsHandler {
  public:
@@ -39,6 +41,10 @@ class RwsHandler {
   };
   using Items = std::vector<Item>;
 
+  bool read_path(const std::string& path);
+  bool action_from_path();
+  bool rapid_from_path();
+  std::optional<ports::HttpReply> refused_type(const ports::HttpRequest& request) const;
   ports::HttpReply route();
   ports::HttpReply panel();
   ports::HttpReply execution();
@@ -49,18 +55,29 @@ class RwsHandler {
   ports::HttpReply modules();
   ports::HttpReply symbol_data();
   ports::HttpReply symbol_properties();
+  ports::HttpReply operation_mode();
+  ports::HttpReply set_motors();
   ports::HttpReply mastership();
+  ports::HttpReply users();
+  ports::HttpReply symbol_search();
+  std::optional<ports::HttpReply> no_edit_right() const;
   ports::HttpReply mechunits();
   ports::HttpReply robtarget();
   ports::HttpReply signals();
+  ports::HttpReply set_signal(const std::string& name);
+  ports::HttpReply make_folder(const std::string& parent);
   ports::HttpReply fileservice();
   ports::HttpReply elog();
   ports::HttpReply system();
   ports::HttpReply retcode();
 
-  ports::HttpReply answer(const Items& items) const;
+  /// `next` is the link to the next page of a list.
+  ports::HttpReply answer(const Items& items, const std::string& next = "") const;
+  ports::HttpReply hal(const Items& items, const std::string& next) const;
   ports::HttpReply fault(int status, long code, const std::string& text) const;
   static ports::HttpReply no_content();
+  bool two() const;
+  const char* edit_domain() const { return two() ? "edit" : "rapid"; }
   bool holds(const std::string& domain) const;
   bool action_is(const std::string& wanted) const;
   std::string query(const std::string& key) const;
@@ -69,11 +86,16 @@ class RwsHandler {
 
   ControllerState& s_;
   int session_;
-  std::string method_, path_, body_;
+  std::string method_, path_, body_, accept_;
+  std::string action_;  ///< "?action=" of generation 1, the verb in the path of generation 2; "" with GET
   std::vector<std::string> segments_;
   std::map<std::string, std::string> query_, form_;
 };
 
+/// Text for XHTML.
+std::string escaped(const std::string& text);
+/// XML declaration, head and the begin of the body.
+std::string xhtml_head(const std::string& title);
 /// "%41+b" -> "A b".
 std::string url_decoded(std::string_view text);
 std::map<std::string, std::string> parse_form(std::string_view text);

@@ -1,5 +1,6 @@
-// The resources of RWS 1.0 that only show things, and files.
+// The resources of RWS that only show things, signals and files.
 #include <fmt/format.h>
+#include <algorithm>
 #include <charconv>
 #include <ctime>
 
@@ -16,6 +17,9 @@ namespace {
 std::string decimal(double value) { return fmt::format("{:.6g}", value); }
 std::string precise(double value) { return fmt::format("{:.9g}", value); }
 const char* const kUnused = "8.999999E+09";
+constexpr std::size_t kMostOnAPage = 100;
+/// Network and device of every simulated signal; generation 2 addresses them in full.
+constexpr const char* kSignalPlace = "EtherNetIP/Local_IO/";
 
 /// The simulated controller's calendar begins with 2026.
 std::string calendar(HostTime at) {
@@ -108,47 +112,78 @@ HttpReply RwsHandler::robtarget() {
   return answer({{cartesian ? "ms-mechunit-cartesian" : "ms-robtargets", segment(4), fields}});
 }
 
+HttpReply RwsHandler::set_signal(const std::string& name) {
+  if (!action_is("set")) return fault(400, kRwsBadValue, "Invalid action");
+  double value = 0;
+  const std::string text = form("lvalue");
+  if (std::from_chars(text.data(), text.data() + text.size(), value).ec != std::errc{} ||
+      (value != 0 && value != 1)) {
+    return fault(400, kRwsBadValue, "Invalid lvalue");
+  }
+  if (rapid::lower(name).rfind("di", 0) == 0)
+    return fault(403, kRwsRejected, "Signal " + name + " is an input: access level");
+  s_.set_signal(name, value);
+  return no_content();
+}
+
 HttpReply RwsHandler::signals() {
-  static const std::vector<std::pair<const char*, const char*>> kSignals{
-      {"doArcOn", "DO"},   {"doGasOn", "DO"},          {"doWireFeed", "DO"},
-      {"doJobDone", "DO"}, {"diArcEstablished", "DI"}, {"diGateClosed", "DI"}};
-  const auto item = [this](const std::pair<const char*, const char*>& signal, const char* type) -> Item {
-    const rapid::Datum* datum = s_.memory.symbol("", rapid::lower(signal.first));
+  const auto item = [this](const std::string& name, double value, const char* type) -> Item {
     return {type,
-            signal.first,
-            {{"name", signal.first},
-             {"type", signal.second},
+            two() ? std::string(kSignalPlace) + name : name,
+            {{"name", name},
+             {"type", rapid::lower(name).rfind("di", 0) == 0 ? "DI" : "DO"},
              {"category", ""},
-             {"lvalue", decimal(datum->value.number)},
+             {"lvalue", decimal(value)},
              {"lstate", "not simulated"}}};
   };
   if (segment(2) != "signals") return fault(404, kRwsNoResource, "Resource not found: " + path_);
+  const auto all = s_.signals();
   if (segments_.size() == 3) {
+    const auto number = [this](const char* key, std::size_t otherwise) {
+      const std::string text = query(key);
+      std::from_chars(text.data(), text.data() + text.size(), otherwise);
+      return otherwise;
+    };
+    const std::size_t start = std::min(number("start", 0), all.size());
+    std::size_t limit = number("limit", two() ? kMostOnAPage : all.size());
+    if (two()) limit = std::clamp<std::size_t>(limit, 1, kMostOnAPage);
+    const std::size_t end = start + std::min(limit, all.size() - start);
     Items items;
-    for (const auto& signal : kSignals) items.push_back(item(signal, "ios-signal-li"));
-    return answer(items);
+    for (std::size_t i = start; i < end; ++i)
+      items.push_back(item(all[i].first, all[i].second, "ios-signal-li"));
+    const bool more = two() && end < all.size();
+    return answer(items, more ? fmt::format("signals?start={}&limit={}", end, limit) : "");
   }
   const std::string name = segments_.back();
-  for (const auto& signal : kSignals) {
-    if (rapid::lower(signal.first) != rapid::lower(name)) continue;
-    if (method_ == "GET") return answer({item(signal, "ios-signal")});
-    if (!action_is("set")) return fault(400, kRwsBadValue, "Invalid action");
-    double value = 0;
-    const std::string text = form("lvalue");
-    if (std::from_chars(text.data(), text.data() + text.size(), value).ec != std::errc{} ||
-        (value != 0 && value != 1)) {
-      return fault(400, kRwsBadValue, "Invalid lvalue");
-    }
-    s_.memory.symbol("", rapid::lower(name))->value.number = value;
-    return no_content();
+  for (const auto& [signal, value] : all) {
+    if (rapid::lower(signal) != rapid::lower(name)) continue;
+    return method_ == "GET" ? answer({item(signal, value, "ios-signal")}) : set_signal(signal);
   }
   return fault(404, kRwsBadSignal, "No signal " + name);
 }
 
+HttpReply RwsHandler::make_folder(const std::string& parent) {
+  const std::string name = rapid::lower(form("fs-newname"));
+  if ((!two() && form("fs-action") != "create") || name.empty() || name.find('/') != std::string::npos)
+    return fault(400, kRwsBadValue, "Invalid fs-action or fs-newname");
+  s_.folders.insert((parent.empty() ? "" : parent + "/") + name);
+  HttpReply reply;
+  reply.status = 201;
+  reply.headers["Location"] = path_ + "/" + name;
+  return reply;
+}
+
 HttpReply RwsHandler::fileservice() {
-  if (rapid::lower(segment(1)) != "$home") return fault(400, kRwsNoPath, "Bad volume " + segment(1));
-  std::string path;
-  for (std::size_t i = 2; i < segments_.size(); ++i) path += (i > 2 ? "/" : "") + rapid::lower(segments_[i]);
+  if (rapid::lower(segment(1)) != (two() ? "home" : "$home"))
+    return fault(400, kRwsBadVolume, "Bad volume " + segment(1));
+  std::string path, folder;
+  for (std::size_t i = 2; i < segments_.size(); ++i) {
+    if (i > 2) folder = path;
+    path += (i > 2 ? "/" : "") + rapid::lower(segments_[i]);
+  }
+  if (!folder.empty() && !s_.folders.contains(folder))
+    return fault(404, kRwsNoPath, "Path does not exist: " + path_);
+  if (method_ == "POST") return make_folder(path);
   if (method_ == "PUT") {
     if (path.empty()) return fault(400, kRwsNoPath, "File name missing");
     const bool fresh = !s_.files.contains(path);
@@ -157,11 +192,20 @@ HttpReply RwsHandler::fileservice() {
     reply.status = fresh ? 201 : 200;
     return reply;
   }
-  if (method_ == "GET" && path.empty()) {
+  if (method_ == "GET" && (path.empty() || s_.folders.contains(path))) {
+    const std::string below = path.empty() ? "" : path + "/";
     Items items;
+    const auto own = [&below](const std::string& full) {
+      return full.rfind(below, 0) == 0 && full.find('/', below.size()) == std::string::npos;
+    };
+    for (const std::string& one : s_.folders) {
+      if (own(one))
+        items.push_back({"fs-dir", one.substr(below.size()), {{"fs-cdate", ""}, {"fs-mdate", ""}}});
+    }
     for (const auto& [name, content] : s_.files) {
+      if (!own(name)) continue;
       items.push_back({"fs-file",
-                       name,
+                       name.substr(below.size()),
                        {{"fs-cdate", ""},
                         {"fs-mdate", ""},
                         {"fs-size", std::to_string(content.size())},
@@ -198,6 +242,12 @@ HttpReply RwsHandler::elog() {
              {"actions", ""},
              {"argc", "0"}}};
   };
+  const bool newest_first = !two() || query("order") == "lifo";
+  if (two() && query("order") == "lifo" && accept_.find("hal+json;v=2.0") != std::string::npos) {
+    HttpReply refused;
+    refused.status = 406;  // the order came with v=2.1
+    return refused;
+  }
   if (segment(2).empty())
     return answer({{"elog-domain-li",
                     "0",
@@ -210,20 +260,42 @@ HttpReply RwsHandler::elog() {
     else if (wanted == std::to_string(event->number))
       return answer({item(*event, "elog-message")});
   }
-  return wanted.empty() ? answer(items) : fault(404, kRwsNoResource, "No event " + wanted);
+  if (!wanted.empty()) return fault(404, kRwsNoResource, "No event " + wanted);
+  if (!newest_first) std::reverse(items.begin(), items.end());
+  std::size_t limit = items.size();
+  const std::string text = query("limit");
+  std::from_chars(text.data(), text.data() + text.size(), limit);
+  if (two()) limit = std::min(limit, kMostOnAPage);
+  items.resize(std::min(limit, items.size()));
+  return answer(items);
 }
 
 HttpReply RwsHandler::system() {
   if (method_ != "GET") return fault(400, kRwsBadValue, "Invalid action");
-  Items items{{"sys-system-li",
-               "system",
-               {{"name", "SIM_2600"},
-                {"rwversion", "6.10.0130"},
-                {"rwversionname", "6.10.01.00"},
-                {"sysid", "{5E5A0000-0000-4000-8000-000000002600}"},
-                {"starttm", calendar({})}}}};
-  for (const char* option : {"616-1 PC Interface", "689-1 Externally Guided Motion (EGM)", "633-4 Arc"}) {
-    items.push_back({"sys-option-li", option, {{"option", option}}});
+  const char* const sysid = "{5E5A0000-0000-4000-8000-000000002600}";
+  Items items;
+  if (two()) {
+    items.push_back({"sys-system",
+                     "system",
+                     {{"major", "7"},
+                      {"minor", "16"},
+                      {"name", "SIM_2600"},
+                      {"rwversion", "7.16.0+229"},
+                      {"sysid", sysid},
+                      {"starttm", calendar(s_.started_at)}}});
+  } else {
+    items.push_back({"sys-system-li",
+                     "system",
+                     {{"name", "SIM_2600"},
+                      {"rwversion", "6.10.0130"},
+                      {"rwversionname", "6.10.01.00"},
+                      {"sysid", sysid},
+                      {"starttm", calendar(s_.started_at)}}});
+  }
+  const char* const one[] = {"616-1 PC Interface", "689-1 Externally Guided Motion (EGM)", "633-4 Arc"};
+  const char* const seven[] = {"RobotWare Base", "3124-1 Externally Guided Motion", "3117-1 Arc"};
+  for (const char* option : two() ? seven : one) {
+    items.push_back({two() ? "sys-option" : "sys-option-li", option, {{"option", option}}});
   }
   return answer(items);
 }
@@ -240,6 +312,7 @@ HttpReply RwsHandler::retcode() {
       {std::to_string(kRwsNoResource), "Resource not found"},
       {std::to_string(kRwsBadSignal), "Invalid IO signal"},
       {std::to_string(kRwsNoPath), "Path does not exist"},
+      {std::to_string(kRwsBadVolume), "Bad volume"},
       {std::to_string(kRwsBadModulePath), "Module path is wrong"}};
   const auto found = kCodes.find(query("code"));
   if (found == kCodes.end()) return fault(404, kRwsBadValue, "Unknown code");

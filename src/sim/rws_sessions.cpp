@@ -1,10 +1,12 @@
 #include "sim/rws_sessions.hpp"
 
+#include <Poco/Base64Encoder.h>
 #include <Poco/MD5Engine.h>
 #include <fmt/format.h>
 
 #include <charconv>
 #include <cmath>
+#include <sstream>
 #include <utility>
 
 #include "sim/noise.hpp"
@@ -106,38 +108,68 @@ void RwsSessions::expire(double now_s) {
   }
 }
 
-RwsAccess RwsSessions::admit(const std::string& method, const std::string& uri,
-                             const std::string& authorization, const std::string& cookie, double now_s) {
-  expire(now_s);
-  RwsAccess out;
+bool RwsSessions::basic_right(const std::string& authorization) const {
+  std::ostringstream text;
+  Poco::Base64Encoder encoder(text);
+  encoder.rdbuf()->setLineLength(0);
+  encoder << user_ << ':' << password_;
+  encoder.close();
+  return authorization == "Basic " + text.str();
+}
+
+int RwsSessions::of_cookie(const std::string& cookie) const {
   const std::string given = cookie_value(cookie, kSessionCookie);
-  if (!given.empty()) {
-    for (auto& [id, session] : sessions_) {
-      if (session.cookie != given) continue;
-      session.last_s = now_s;
-      out.verdict = RwsAccess::Verdict::Allowed;
-      out.session = id;
-      return out;
-    }
+  for (const auto& [id, session] : sessions_) {
+    if (!given.empty() && session.cookie == given) return id;
   }
-  bool stale = false;
-  if (authorization.empty() || !digest_right(method, uri, authorization, now_s, stale)) {
-    out.challenge = fmt::format(
-        "Digest realm=\"{}\", domain=\"127.0.0.1:80\", qop=\"auth\", nonce=\"{}\", opaque=\"\", "
-        "algorithm=\"MD5\", stale=\"{}\"",
-        kRealm, nonce(std::floor(now_s)), stale ? "TRUE" : "FALSE");
-    return out;
-  }
-  if (sessions_.size() >= kRwsMaxSessions) {
+  return 0;
+}
+
+RwsAccess RwsSessions::begin(double now_s) {
+  RwsAccess out;
+  if (sessions_.size() >= (generation_ == 2 ? kRws2MaxSessions : kRwsMaxSessions)) {
     out.verdict = RwsAccess::Verdict::Full;
     return out;
   }
   out.verdict = RwsAccess::Verdict::Allowed;
   out.session = next_session_++;
   sessions_[out.session] = {token("session"), now_s};
-  out.set_cookies = {fmt::format("{}={}; path=/; httponly", kSessionCookie, sessions_[out.session].cookie),
-                     fmt::format("ABBCX={}; path=/; httponly", token("connection").substr(0, 8))};
+  const std::string more = generation_ == 2 ? "; path=/; secure; httponly" : "; path=/; httponly";
+  out.set_cookies = {fmt::format("{}={}{}", kSessionCookie, sessions_[out.session].cookie, more),
+                     fmt::format("ABBCX={}{}", token("connection").substr(0, 8), more)};
   return out;
+}
+
+RwsAccess RwsSessions::admit(const std::string& method, const std::string& uri,
+                             const std::string& authorization, const std::string& cookie, double now_s) {
+  expire(now_s);
+  RwsAccess out;
+  if (const int known = of_cookie(cookie); known != 0) {
+    sessions_[known].last_s = now_s;
+    out.verdict = RwsAccess::Verdict::Allowed;
+    out.session = known;
+    return out;
+  }
+  if (generation_ == 2) {
+    if (basic_right(authorization)) return begin(now_s);
+    out.challenge = fmt::format("Basic realm=\"{}\"", kRealm);
+    return out;
+  }
+  bool stale = false;
+  if (!authorization.empty() && digest_right(method, uri, authorization, now_s, stale)) return begin(now_s);
+  out.challenge = fmt::format(
+      "Digest realm=\"{}\", domain=\"127.0.0.1:80\", qop=\"auth\", nonce=\"{}\", opaque=\"\", "
+      "algorithm=\"MD5\", stale=\"{}\"",
+      kRealm, nonce(std::floor(now_s)), stale ? "TRUE" : "FALSE");
+  return out;
+}
+
+bool RwsLoad::admit(double now_s) {
+  if (most_per_s_ <= 0) return true;
+  while (!times_s_.empty() && times_s_.front() <= now_s - 1) times_s_.pop_front();
+  if (static_cast<double>(times_s_.size()) >= most_per_s_) return false;
+  times_s_.push_back(now_s);
+  return true;
 }
 
 void RwsSessions::log_out(int session) { sessions_.erase(session); }

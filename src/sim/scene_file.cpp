@@ -17,8 +17,8 @@ using files::Map;
 using files::Need;
 using files::Node;
 
-const std::vector<std::string> kKinds{"laser_drop", "laser_stall", "egm_silence",  "estop",
-                                      "guardstop",  "motors_off",  "program_stop", "rws_503"};
+const std::vector<std::string> kKinds{"laser_drop", "laser_stall", "egm_silence",  "estop",   "guardstop",
+                                      "motors_off", "manual",      "program_stop", "restart", "rws_503"};
 
 bool take_number(std::string_view text, double& out) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
@@ -158,6 +158,9 @@ class SceneReader {
     m.text("user", c.user);
     m.text("password", c.password);
     m.boolean("auto", c.auto_mode);
+    m.integer("rws_generation", c.rws_generation, {1, 2});
+    m.boolean("rws_hal", c.rws_hal);
+    m.number("rws_requests_per_s", c.rws_requests_per_s, {0, 10'000});
     if (const Node* list = m.sequence("modules")) {
       for (const Node& node : list->items) {
         auto text = files::read_text_file(beside(node.text));

@@ -19,6 +19,8 @@ struct Endpoint {
 };
 
 enum class RealTime { Off, Try, Required };
+/// Auto: found out from the controller's first answer.
+enum class RwsGenerationChoice { One, Two, Auto };
 
 struct CellConfig {
   std::string path;  ///< of the file
@@ -28,6 +30,8 @@ struct CellConfig {
   Endpoint egm{"127.0.0.1", 6511};  ///< UDP, we listen
   std::string egm_peer;  ///< only this source address is answered; "" = the first one seen in a session
   Endpoint rws{"127.0.0.1", 8080};
+  RwsGenerationChoice rws_generation = RwsGenerationChoice::One;
+  std::string rws_certificate_sha256;  ///< 64 lower-case hexadecimal digits, "" with generation 1
   std::string rws_user = "Default User";
   std::string rws_password_file;  ///< secrets never stand in YAML; relative to the cell file; or credential
                                   ///< "rws-password"

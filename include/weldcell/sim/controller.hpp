@@ -1,6 +1,6 @@
-// The simulated ABB controller: EGM by the documented control law, RWS 1.0 requests, and RAPID that moves the
-// arm. Single- threaded and clockless: whoever owns it gives the time. Built from the protocol facts, never
-// from the daemon.
+// The simulated ABB controller: EGM by the documented control law, RWS requests of both generations, and
+// RAPID that moves the arm. Single-threaded and clockless: whoever owns it gives the time. Built from the
+// protocol facts, never from the daemon.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "weldcell/base/time.hpp"
@@ -26,6 +27,14 @@ struct Event {
   std::string title, text;
 };
 
+/// What a subscribed RWS resource shows now, as the entry of an event frame.
+struct RwsObserved {
+  std::string type, title, self;  ///< class and title of the entry, href of its own link
+  std::vector<std::pair<std::string, std::string>> fields;
+  bool quick = false;  ///< an I/O signal or a persistent: may be subscribed with high priority
+  bool operator==(const RwsObserved&) const = default;
+};
+
 struct ControllerState;
 
 class Controller {
@@ -39,11 +48,19 @@ class Controller {
   std::optional<std::vector<std::byte>> egm_datagram();
   /// An EgmSensor datagram from the PC; malformed ones are counted and logged as an event, never harmful.
   void on_egm_datagram(std::span<const std::byte> datagram);
-  /// One authenticated RWS 1.0 request (digest, cookies and sessions are the server's matter). Mastership
+  /// One authenticated RWS request (credentials, cookies and sessions are the server's matter). Mastership
   /// belongs to a session.
   ports::HttpReply handle_rws(const ports::HttpRequest& request, int session = 0);
   /// The session logged out or expired: what it held is free.
   void end_rws_session(int session);
+
+  /// The value of a resource as a subscription names it, with its ";suffix"; empty when there is none.
+  std::optional<RwsObserved> observe_rws(const std::string& uri);
+  /// 1 or 2.
+  int rws_generation() const;
+  /// A restart is under way: nothing answers; and how often that happened.
+  bool restarting() const;
+  std::uint64_t restarts() const;
 
   /// True arm posture now (not what EGM reports).
   const kinematics::Joints& joints() const;
@@ -51,8 +68,9 @@ class Controller {
   /// them. step() must have been called at equal intervals of the cycle.
   kinematics::Joints joints_at(HostTime t) const;
   const std::vector<WeldTrace>& weld_traces() const;
-  /// Faults from outside: "estop", "guardstop", "motors_off", "program_stop", "egm_silence", "rws_503". Those
-  /// that last end after duration_s (0: never). False when the kind is unknown.
+  /// Faults from outside: "estop", "guardstop", "motors_off", "manual", "program_stop", "restart",
+  /// "egm_silence", "rws_503". Those that last end after duration_s (0: never; a restart takes 5 s). False
+  /// when the kind is unknown.
   bool inject(const std::string& fault, double duration_s = 0);
 
   /// Loads a module as a disk restart would: no mastership needed. Error "rapid.*".

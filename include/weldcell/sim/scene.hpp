@@ -45,6 +45,9 @@ struct ControllerTruth {
   double feedback_latency_ms = 0;  ///< feedBack.time minus true instant of the posture
   std::string user = "Default User", password = "robotics";
   bool auto_mode = true;
+  int rws_generation = 0;            ///< 1 or 2; 0: what the cell file expects, 1 when it leaves it open
+  bool rws_hal = true;               ///< false: early RobotWare 7 that answers HAL with 406
+  double rws_requests_per_s = 20;    ///< more within a second are answered 503; 0: no limit
   std::vector<std::string> modules;  ///< texts of the RAPID modules that are loaded at start
 };
 

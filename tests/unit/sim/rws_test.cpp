@@ -190,7 +190,9 @@ TEST(RwsServer, AnswersAPocoClientWithDigest) {
   Scene scene = test_scene();
   Controller controller(scene, scene.cell.setup.arm);
   std::mutex lock;
-  RwsServer server({"127.0.0.1", 0}, "Default User", "robotics", 1, controller, lock);
+  RwsServerOptions options;
+  options.endpoint = {"127.0.0.1", 0};
+  RwsServer server(std::move(options), controller, lock);
   namespace net = Poco::Net;
   net::HTTPClientSession session("127.0.0.1", static_cast<Poco::UInt16>(server.port()));
   net::HTTPRequest request("GET", "/rw/panel/ctrlstate?json=1", "HTTP/1.1");
