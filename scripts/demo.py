@@ -31,6 +31,8 @@ def parse(arguments=None):
     parser.add_argument("--keep", action="store_true", help="leave simulator and daemon running")
     parser.add_argument("--dir", help="working directory (default: a new one, printed)")
     parser.add_argument("--fault", action="append", default=[], help="handed to weldcell-sim, e.g. laser_drop@scan+5:2")
+    parser.add_argument("--rws", type=int, choices=(1, 2), default=1,
+                        help="generation of Robot Web Services: 1 as IRC5 (default), 2 as OmniCore, over TLS with a pinned certificate")
     parser.add_argument("--timeout", type=float, default=420, help="seconds for one job")
     parser.add_argument("--bin", default=os.path.join(TOP, "build/release/bin"), help=argparse.SUPPRESS)
     return parser.parse_args(arguments)
@@ -78,6 +80,8 @@ class Demo:
         if self.options.free_ports:
             for name, port in free_ports().items():
                 text = text.replace(f"127.0.0.1:{PORTS[name]}", f"127.0.0.1:{port}")
+        if self.options.rws == 2:
+            text = self.with_generation_two(text)
         self.cell = os.path.join(self.dir, "cell-demo.yaml")
         with open(self.cell, "w") as f:
             f.write(text)
@@ -90,6 +94,13 @@ class Demo:
         secret = os.path.join(secret_dir, "rws-password")
         shutil.copyfile(os.path.join(CONFIG, "demo/rws-password"), secret)
         os.chmod(secret, 0o600)
+
+    def with_generation_two(self, text):
+        """The simulated OmniCore makes its certificate, the cell file pins it."""
+        self.certificate = os.path.join(self.dir, "rws-certificate.pem")
+        made = subprocess.run([self.program("weldcell-sim"), "--make-certificate", self.certificate],
+                              capture_output=True, text=True, check=True)
+        return re.sub(r"^rws:$", f"rws:\n  generation: 2\n  certificate_sha256: {made.stdout.strip()}", text, flags=re.M)
 
     def job_file_text(self):
         with open(os.path.join(CONFIG, f"jobs/demo-{self.part}.yaml")) as f:
@@ -116,9 +127,11 @@ class Demo:
 
     def start_sim(self, seed):
         self.truth = os.path.join(self.dir, f"truth-{seed}.json")
-        faults = [word for spec in self.options.fault for word in ("--fault", spec)]
+        more = [word for spec in self.options.fault for word in ("--fault", spec)]
+        if self.options.rws == 2:
+            more += ["--certificate", self.certificate]
         self.sim = self.start("weldcell-sim", ["--cell", self.cell, "--scene", os.path.join(self.dir, f"scenes/{self.part}.yaml"),
-                                               "--truth", self.truth, "--seed", str(seed), *faults])
+                                               "--truth", self.truth, "--seed", str(seed), *more])
 
     def end(self, process):
         if process and process.poll() is None:

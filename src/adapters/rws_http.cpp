@@ -2,6 +2,7 @@
 
 #include <Poco/Exception.h>
 #include <Poco/Net/HTTPAuthenticationParams.h>
+#include <Poco/Net/HTTPBasicCredentials.h>
 #include <Poco/Net/HTTPClientSession.h>
 #include <Poco/Net/HTTPCredentials.h>
 #include <Poco/Net/HTTPDigestCredentials.h>
@@ -18,7 +19,9 @@
 #include <thread>
 #include <utility>
 
+#include "rws_session.hpp"
 #include "weldcell/adapters/host_clock.hpp"
+#include "weldcell/wire/rws_pace.hpp"
 
 namespace weldcell::adapters {
 namespace {
@@ -26,10 +29,10 @@ namespace {
 using Poco::Net::HTTPRequest;
 using Poco::Net::HTTPResponse;
 
+using wire::RwsGeneration;
+
 constexpr std::size_t kMostBodyBytes = 16u << 20;
 constexpr Nanoseconds kLogoutTimeout = kSecond;
-
-Poco::Timespan span(Nanoseconds ns) { return {ns / kSecond, static_cast<long>(ns % kSecond / kMicrosecond)}; }
 
 /// "name=value; path=/; httponly" -> {name, value}.
 std::optional<std::pair<std::string, std::string>> parse_cookie(const std::string& text) {
@@ -46,41 +49,43 @@ struct RwsHttp::State {
   explicit State(RwsAccess a)
       : access(std::move(a)),
         digest(access.user, access.password),
+        basic(access.user, access.password),
+        rate(access.least_interval, access.burst),
         place("rws " + access.host + ":" + std::to_string(access.port)) {}
 
   RwsAccess access;
   Poco::Net::HTTPDigestCredentials digest;
+  Poco::Net::HTTPBasicCredentials basic;
+  wire::RwsPace rate;
   std::string place;
   std::unique_ptr<Poco::Net::HTTPClientSession> session;
   bool has_nonce = false;
   bool fresh_connection = true;
   std::map<std::string, std::string> cookies;
-  HostTime last_start{-kSecond};
   RwsHttpCounters counters;
 
   Error fault(const char* code, const std::string& what, const char* mend) const {
     return {code, place, what, mend};
   }
-  void connect();
+  bool two() const { return access.generation == RwsGeneration::Two; }
   void pace();
+  std::string cookie_line() const;
   ports::HttpReply send_once(const ports::HttpRequest& request, HTTPResponse& response, HTTPRequest& wire);
   void keep_cookies(const HTTPResponse& response);
   std::optional<Error> answer_challenge(HTTPRequest& wire, const HTTPResponse& response);
   Result<ports::HttpReply> exchange(const ports::HttpRequest& request);
 };
 
-void RwsHttp::State::connect() {
-  session =
-      std::make_unique<Poco::Net::HTTPClientSession>(access.host, static_cast<Poco::UInt16>(access.port));
-  session->setKeepAlive(true);
-  session->setTimeout(span(access.timeout), span(access.timeout), span(access.timeout));
-  fresh_connection = true;
+void RwsHttp::State::pace() {
+  const Nanoseconds wait = rate.wait(now());
+  if (wait > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(wait));
+  rate.started(now());
 }
 
-void RwsHttp::State::pace() {
-  const Nanoseconds wait = last_start + access.least_interval - now();
-  if (wait > 0) std::this_thread::sleep_for(std::chrono::nanoseconds(wait));
-  last_start = now();
+std::string RwsHttp::State::cookie_line() const {
+  std::string line;
+  for (const auto& [name, value] : cookies) line += (line.empty() ? "" : "; ") + name + "=" + value;
+  return line;
 }
 
 void RwsHttp::State::keep_cookies(const HTTPResponse& response) {
@@ -92,13 +97,12 @@ void RwsHttp::State::keep_cookies(const HTTPResponse& response) {
 
 ports::HttpReply RwsHttp::State::send_once(const ports::HttpRequest& request, HTTPResponse& response,
                                            HTTPRequest& wire) {
-  if (!request.body.empty() || request.method == "POST" || request.method == "PUT") {
+  if (!request.body.empty() || (request.method != "GET" && !request.content_type.empty())) {
     wire.setContentType(request.content_type);
     wire.setContentLength64(static_cast<Poco::Int64>(request.body.size()));
   }
-  std::string line;
-  for (const auto& [name, value] : cookies) line += (line.empty() ? "" : "; ") + name + "=" + value;
-  if (!line.empty()) wire.set("Cookie", line);
+  if (!request.accept.empty()) wire.set("Accept", request.accept);
+  if (const std::string line = cookie_line(); !line.empty()) wire.set("Cookie", line);
   pace();
   ++counters.requests;
   const HostTime deadline = now() + 4 * access.timeout;
@@ -120,27 +124,41 @@ ports::HttpReply RwsHttp::State::send_once(const ports::HttpRequest& request, HT
 std::optional<Error> RwsHttp::State::answer_challenge(HTTPRequest& wire, const HTTPResponse& response) {
   for (const auto& [name, value] : response) {
     if (Poco::icompare(name, "WWW-Authenticate") != 0) continue;
-    if (!Poco::Net::HTTPCredentials::isDigestCredentials(value)) continue;
+    if (two() && Poco::Net::HTTPCredentials::isBasicCredentials(value)) {
+      basic.authenticate(wire);
+      has_nonce = true;
+      ++counters.challenges;
+      return std::nullopt;
+    }
+    if (two() || !Poco::Net::HTTPCredentials::isDigestCredentials(value)) continue;
     digest.authenticate(wire, Poco::Net::HTTPAuthenticationParams(value.substr(7)));
     has_nonce = true;
     ++counters.challenges;
     return std::nullopt;
   }
-  return fault("http.refused", "the controller asks for another authentication than digest",
-               "this is no RWS 1.0 (IRC5, RobotWare 6): check rws.host and rws.port");
+  return fault(
+      "http.refused",
+      std::string("the controller asks for another authentication than ") + (two() ? "basic" : "digest"),
+      "check rws.address and rws.generation: RWS 1.0 is IRC5, RobotWare 6, RWS 2.0 is OmniCore");
 }
 
 Result<ports::HttpReply> RwsHttp::State::exchange(const ports::HttpRequest& request) {
   bool challenged = false, reconnected = false;
+  int overloads = 0;
   std::optional<HTTPResponse> challenge;
   for (;;) {
     const bool kept = session && !fresh_connection;
     try {
-      if (!session) connect();
+      if (!session) {
+        session = make_rws_session(access);
+        fresh_connection = true;
+      }
       HTTPRequest wire(request.method, request.path, HTTPRequest::HTTP_1_1);
       if (challenge) {
         if (auto error = answer_challenge(wire, *challenge)) return *error;
         challenge.reset();
+      } else if (has_nonce && two()) {
+        basic.authenticate(wire);
       } else if (has_nonce) {
         digest.updateAuthInfo(wire);
       }
@@ -156,8 +174,16 @@ Result<ports::HttpReply> RwsHttp::State::exchange(const ports::HttpRequest& requ
         challenge = response;
         continue;
       }
-      if (reply.status == HTTPResponse::HTTP_SERVICE_UNAVAILABLE) ++counters.overloads;
-      return reply;
+      if (reply.status != HTTPResponse::HTTP_SERVICE_UNAVAILABLE) return reply;
+      ++counters.overloads;
+      // Refused before anything was done: asked again, after the pause that the controller needs.
+      if (overloads++ == access.overload_retries) return reply;
+      rate.hold_until(now() + access.overload_pause);
+    } catch (const WrongCertificate& e) {
+      session.reset();
+      return fault("http.certificate", e.message(),
+                   "if the controller got a new certificate, check it there and write its fingerprint to "
+                   "rws.certificate_sha256; else somebody stands in between");
     } catch (const Poco::TimeoutException&) {
       session.reset();
       return fault("http.timeout", "no answer to " + request.method + " " + request.path,
@@ -170,7 +196,7 @@ Result<ports::HttpReply> RwsHttp::State::exchange(const ports::HttpRequest& requ
         continue;
       }
       return fault("http.unreachable", request.method + " " + request.path + ": " + e.displayText(),
-                   "check that the controller runs, and rws.host and rws.port");
+                   "check that the controller runs, and rws.address and rws.generation");
     }
   }
 }
@@ -182,13 +208,20 @@ Result<ports::HttpReply> RwsHttp::exchange(const ports::HttpRequest& request) {
   return state_->exchange(request);
 }
 const RwsHttpCounters& RwsHttp::counters() const { return state_->counters; }
+const RwsAccess& RwsHttp::access() const { return state_->access; }
+std::string RwsHttp::cookie_header() const { return state_->cookie_line(); }
+
+void RwsHttp::take_turn() {
+  state_->pace();
+  ++state_->counters.requests;
+}
 
 void RwsHttp::logout() {
   State& s = *state_;
   if (s.cookies.empty()) return;
   const Nanoseconds usual = std::exchange(s.access.timeout, std::min(s.access.timeout, kLogoutTimeout));
   s.session.reset();
-  static_cast<void>(s.exchange({"GET", "/logout", "", ""}));
+  static_cast<void>(s.exchange({"GET", "/logout", "", "", s.two() ? "application/xhtml+xml;v=2.0" : ""}));
   s.access.timeout = usual;
   s.cookies.clear();
   s.session.reset();

@@ -12,8 +12,6 @@
 #include "weldcell/adapters/laser_tcp.hpp"
 #include "weldcell/adapters/projector_png.hpp"
 #include "weldcell/adapters/projector_window.hpp"
-#include "weldcell/adapters/rws_http.hpp"
-#include "weldcell/app/robot_runner.hpp"
 
 namespace weldcell::app {
 
@@ -23,13 +21,13 @@ constexpr Nanoseconds kPoll = 100 * kMillisecond;
 
 bool stopping(const Wiring& wiring) { return wiring.stopping.load(std::memory_order_relaxed); }
 
+}  // namespace
+
 void report_link(Wiring& wiring, job::Link link, bool up, const std::string& detail) {
   // The cell must not miss a link: when its inbox is full, it is asked again at the next change of the
   // device.
   wiring.inbox.push({job::LinkChange{link, up, detail}, nullptr, nullptr});
 }
-
-}  // namespace
 
 void run_egm(Wiring& wiring, adapters::EgmSocket& socket) {
   EgmItem item;
@@ -77,45 +75,6 @@ void run_laser(Wiring& wiring) {
       wiring.laser.push(item);
     }
     if (!stopping(wiring)) report_link(wiring, job::Link::Laser, false, socket->reason());
-  }
-}
-
-void run_rws(Wiring& wiring, const std::string& password, const std::string& resident_module) {
-  adapters::RwsAccess access;
-  access.host = wiring.config.rws.host;
-  access.port = wiring.config.rws.port;
-  access.user = wiring.config.rws_user;
-  access.password = password;
-  adapters::RwsHttp http(access);
-  adapters::RwsClient rws(http);
-  RobotRunner runner(rws, wiring.config.rws_task, resident_module);
-  std::optional<bool> link;
-  HostTime next_look;
-  constexpr Nanoseconds kLook = 2 * kSecond;
-  while (!stopping(wiring)) {
-    wiring.beat(ThreadName::Rws);
-    const HostTime now = adapters::now();
-    if (auto request = wiring.robot_requests.pop(std::chrono::milliseconds(runner.busy() ? 20 : 100))) {
-      // A stop never waits behind a move; a move never begins before the stop ahead of it has ended.
-      while (runner.busy() && request->task != job::RobotTask::Stop && !stopping(wiring)) {
-        if (const auto reply = runner.step(adapters::now())) wiring.inbox.push({*reply, nullptr, nullptr});
-        wiring.beat(ThreadName::Rws);
-        std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      }
-      runner.begin(*request, adapters::now());
-    }
-    if (runner.busy()) {
-      if (const auto reply = runner.step(adapters::now())) wiring.inbox.push({*reply, nullptr, nullptr});
-      next_look = now + kLook;
-    } else if (now >= next_look) {
-      next_look = now + kLook;
-      const auto state = rws.controller_state();
-      if (link != state.ok()) {
-        link = state.ok();
-        report_link(wiring, job::Link::Rws, *link,
-                    state.ok() ? adapters::to_string(*state) : state.error().text());
-      }
-    }
   }
 }
 

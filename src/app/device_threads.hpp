@@ -14,8 +14,14 @@ namespace weldcell::app {
 void run_egm(Wiring& wiring, adapters::EgmSocket& socket);
 /// Keeps the laser connected and its bytes flowing to the cell while a scan wants them.
 void run_laser(Wiring& wiring);
-/// Robot requests over RWS, one at a time; between them it watches whether the controller answers.
-void run_rws(Wiring& wiring, const std::string& password, const std::string& resident_module);
+/// The resident RAPID module's text, by generation of RWS: RobotWare 6 (.mod) and 7 (.modx).
+struct ResidentModules {
+  std::string mod, modx;
+};
+/// Robot requests over RWS, one at a time; beside them a subscription tells what the controller does.
+void run_rws(Wiring& wiring, const std::string& password, const ResidentModules& resident);
+/// Tells the cell that a device came or went.
+void report_link(Wiring& wiring, job::Link link, bool up, const std::string& detail);
 /// The PLC's server: orders to the cell, status back, heartbeats both ways.
 void run_plc(Wiring& wiring, adapters::ModbusServer& server);
 /// Window and PNG of what the worker sees.

@@ -57,6 +57,14 @@ std::string arm_text(const files::CellConfig& config) {
   return text.ok() ? *text : std::string{};
 }
 
+/// WeldcellEgm for RobotWare 6, and for 7 where it differs.
+Result<ResidentModules> resident_modules() {
+  const auto mod = read_file(shared_file("rapid/WeldcellEgm.mod"));
+  if (!mod.ok()) return mod.error();
+  const auto modx = read_file(shared_file("rapid/WeldcellEgm.modx"));
+  return ResidentModules{*mod, modx.ok() ? *modx : *mod};
+}
+
 Status write_ports(const std::string& path, const Wiring& wiring) {
   if (path.empty()) return Done{};
   return write_file_durably(path, fmt::format("{{\"egm\": {}, \"modbus\": {}}}\n", wiring.egm_port.load(),
@@ -75,7 +83,7 @@ void come_to_rest(Wiring& wiring, const SpoolKeeper&) {
 int serve(const files::CellConfig& config, const std::string& ports_file) {
   const auto password = password_of(config);
   if (!password.ok()) return refuse(password.error().text());
-  const auto resident = read_file(shared_file("rapid/WeldcellEgm.mod"));
+  const auto resident = resident_modules();
   if (!resident.ok()) return refuse("the resident RAPID module is missing: " + resident.error().text());
 
   std::error_code error;

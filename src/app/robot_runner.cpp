@@ -10,7 +10,7 @@ namespace weldcell::app {
 
 namespace {
 
-constexpr Nanoseconds kPollInterval = 150 * kMillisecond;
+constexpr Nanoseconds kPollInterval = 150 * kMillisecond, kSlowPoll = kSecond;
 constexpr double kHaltTimeout = 5, kMoveTimeout = 60;
 constexpr const char* kResident = "WeldcellEgm";
 constexpr const char* kJobModule = "WeldcellJob";
@@ -41,18 +41,8 @@ std::optional<job::RobotReply> RobotRunner::step(HostTime now) {
       phase_ = Phase::AwaitHalt;
       break;
     }
-    case Phase::AwaitHalt: {
-      const auto running = rws_->execution_state();
-      if (!running.ok()) return answer(running.error());
-      if (*running == adapters::ExecutionState::Stopped) {
-        if (request_.task == job::RobotTask::Stop) return answer(Done{});
-        phase_ = Phase::Act;
-        next_poll_ = now;
-      } else if (seconds(now - since_) > kHaltTimeout) {
-        return answer(Error{"robot.halt", "RAPID", "the program did not stop", "stop it on the FlexPendant"});
-      }
-      break;
-    }
+    case Phase::AwaitHalt:
+      return await_halt(now);
     case Phase::Act: {
       if (request_.task == job::RobotTask::Query) {
         phase_ = Phase::Idle;
@@ -64,26 +54,52 @@ std::optional<job::RobotReply> RobotRunner::step(HostTime now) {
       since_ = now;
       break;
     }
-    case Phase::AwaitEnd: {
-      const auto running = rws_->execution_state();
-      if (!running.ok()) return answer(running.error());
-      if (*running != adapters::ExecutionState::Stopped) {
-        if (seconds(now - since_) > kMoveTimeout) {
-          return answer(
-              Error{"robot.move", "RAPID", "the move did not end within 60 s", "look at the FlexPendant"});
-        }
-        break;
-      }
-      const auto state = rws_->read_symbol(task_, kResident, "nWeldcellState");
-      if (!state.ok()) return answer(state.error());
-      if (*state != "2") {
-        return answer(Error{"robot.move", "RAPID", "the move stopped before its end: " + last_event_text(),
-                            "clear the cause, arm and resume"});
-      }
-      return answer(Done{});
-    }
+    case Phase::AwaitEnd:
+      return await_end(now);
   }
   return std::nullopt;
+}
+
+bool RobotRunner::worth_asking(HostTime now) {
+  // An event may be late, never early: "running" saves the question, "stopped" is confirmed by one.
+  const bool told_running =
+      view_ != nullptr && view_->live && view_->execution == adapters::ExecutionState::Running;
+  if (told_running && now - asked_ < kSlowPoll) {
+    next_poll_ = now;
+    return false;
+  }
+  asked_ = now;
+  return true;
+}
+
+std::optional<job::RobotReply> RobotRunner::await_halt(HostTime now) {
+  if (!worth_asking(now)) return std::nullopt;
+  const auto running = rws_->execution_state();
+  if (!running.ok()) return answer(running.error());
+  if (*running == adapters::ExecutionState::Stopped) {
+    if (request_.task == job::RobotTask::Stop) return answer(Done{});
+    phase_ = Phase::Act;
+    next_poll_ = now;
+  } else if (seconds(now - since_) > kHaltTimeout) {
+    return answer(Error{"robot.halt", "RAPID", "the program did not stop", "stop it on the FlexPendant"});
+  }
+  return std::nullopt;
+}
+
+std::optional<job::RobotReply> RobotRunner::await_end(HostTime now) {
+  if (!worth_asking(now)) return std::nullopt;
+  const auto running = rws_->execution_state();
+  if (!running.ok()) return answer(running.error());
+  if (*running != adapters::ExecutionState::Stopped) {
+    if (seconds(now - since_) <= kMoveTimeout) return std::nullopt;
+    return answer(
+        Error{"robot.move", "RAPID", "the move did not end within 60 s", "look at the FlexPendant"});
+  }
+  const auto state = rws_->read_symbol(task_, kResident, "nWeldcellState");
+  if (!state.ok()) return answer(state.error());
+  if (*state == "2") return answer(Done{});
+  return answer(Error{"robot.move", "RAPID", "the move stopped before its end: " + last_event_text(),
+                      "clear the cause, arm and resume"});
 }
 
 job::RobotReply RobotRunner::answer(const Status& status) {
@@ -106,10 +122,11 @@ Status RobotRunner::halt() {
 Status RobotRunner::act() {
   using job::RobotTask;
   if (request_.task == RobotTask::Upload) {
-    if (auto s = rws_->upload_file("$home/WeldcellJob.mod", request_.module_text); !s.ok()) return s;
+    const std::string path = rws_->module_path(kJobModule);
+    if (auto s = rws_->upload_file(path, request_.module_text); !s.ok()) return s;
     auto lease = rws_->lease(adapters::MastershipDomain::Rapid);
     if (!lease.ok()) return lease.error();
-    if (auto s = rws_->load_module(task_, "$home/WeldcellJob.mod"); !s.ok()) return s;
+    if (auto s = rws_->load_module(task_, path); !s.ok()) return s;
     return lease->release();
   }
   if (auto s = make_ready(); !s.ok()) return s;
@@ -153,12 +170,13 @@ Status RobotRunner::make_resident() {
   const auto loaded = rws_->modules(task_);
   if (!loaded.ok()) return loaded.error();
   const bool there = std::find(loaded->begin(), loaded->end(), kResident) != loaded->end();
-  const auto text = rws_->download_file("$home/WeldcellEgm.mod");
+  const std::string path = rws_->module_path(kResident);
+  const auto text = rws_->download_file(path);
   if (!there || !text.ok() || *text != resident_) {
-    if (auto s = rws_->upload_file("$home/WeldcellEgm.mod", resident_); !s.ok()) return s;
+    if (auto s = rws_->upload_file(path, resident_); !s.ok()) return s;
     auto lease = rws_->lease(adapters::MastershipDomain::Rapid);
     if (!lease.ok()) return lease.error();
-    if (auto s = rws_->load_module(task_, "$home/WeldcellEgm.mod"); !s.ok()) return s;
+    if (auto s = rws_->load_module(task_, path); !s.ok()) return s;
     if (auto s = lease->release(); !s.ok()) return s;
   }
   resident_checked_ = true;

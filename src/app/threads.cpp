@@ -18,7 +18,7 @@ struct Row {
 
 Result<std::vector<rt::Thread>> start_threads(Wiring& wiring, CellThread& cell, adapters::EgmSocket& egm,
                                               adapters::ModbusServer& modbus, const std::string& rws_password,
-                                              const std::string& resident_module) {
+                                              const ResidentModules& resident) {
   constexpr std::size_t kKiB = 1024;
   const bool realtime = wiring.config.realtime != files::RealTime::Off;
   // FIFO 70 and 60 stay below the kernel's own interrupt threads where those are threaded; EGM answers first,
@@ -29,7 +29,7 @@ Result<std::vector<rt::Thread>> start_threads(Wiring& wiring, CellThread& cell, 
       {{"cell", 0, 0, 1024 * kKiB}, [&] { cell.run(); }},
       {{"solver", 0, 10, 4096 * kKiB}, [&] { run_solver(wiring); }},
       {{"rws", 0, 0, 512 * kKiB},
-       [&wiring, rws_password, resident_module] { run_rws(wiring, rws_password, resident_module); }},
+       [&wiring, rws_password, resident] { run_rws(wiring, rws_password, resident); }},
       {{"plc", 0, 0, 256 * kKiB}, [&] { run_plc(wiring, modbus); }},
       {{"projector", 0, 0, 1024 * kKiB}, [&] { run_projector(wiring); }},
   };

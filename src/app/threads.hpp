@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "app/cell_thread.hpp"
+#include "app/device_threads.hpp"
 #include "app/wiring.hpp"
 #include "weldcell/adapters/egm_udp.hpp"
 #include "weldcell/adapters/modbus_server.hpp"
@@ -16,7 +17,7 @@ namespace weldcell::app {
 /// said once. Clearing the vector joins them: set wiring.stopping first.
 Result<std::vector<rt::Thread>> start_threads(Wiring& wiring, CellThread& cell, adapters::EgmSocket& egm,
                                               adapters::ModbusServer& modbus, const std::string& rws_password,
-                                              const std::string& resident_module);
+                                              const ResidentModules& resident);
 
 /// Kicks systemd's watchdog only while every thread's heartbeat moves.
 class Watchdog {

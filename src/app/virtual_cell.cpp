@@ -36,7 +36,8 @@ class VirtualCell {
         controller_(scene, config.setup.arm),
         laser_(scene),
         transport_(controller_),
-        rws_(transport_),
+        rws_(transport_,
+             controller_.rws_generation() == 2 ? wire::RwsGeneration::Two : wire::RwsGeneration::One),
         runner_(rws_, config.rws_task, job.resident_module) {}
 
   VirtualOutcome run() {

@@ -15,6 +15,7 @@
 #include "weldcell/job/cell.hpp"
 #include "weldcell/robot/egm_session.hpp"
 #include "weldcell/rt/spsc_ring.hpp"
+#include "weldcell/wire/rws_replies.hpp"
 
 namespace weldcell::app {
 
@@ -87,6 +88,10 @@ struct Wiring {
   std::atomic<bool> takes_jobs{true};
   std::array<std::atomic<std::uint64_t>, kThreads> heartbeats{};
   std::atomic<int> egm_port{0}, modbus_port{0};
+  std::atomic<wire::ControllerState> controller_state{};  ///< rws -> operator's status
+  std::atomic<wire::OperationMode> operation_mode{};
+  std::atomic<wire::ExecutionState> execution_state{};
+  std::atomic<bool> rws_live{false};  ///< the three come by subscription
 
   void beat(ThreadName thread) {
     heartbeats[static_cast<std::size_t>(thread)].fetch_add(1, std::memory_order_relaxed);

@@ -182,6 +182,53 @@ def robot_stopped_in_scan(bin_dir):
     fault_in_scan(bin_dir, "program_stop@scan+5", 5, ["EGM", "stop"])
 
 
+def omnicore(bin_dir):
+    """RWS 2.0 over TLS with a pinned certificate: moves, the guided scan, and a restart of the controller in the middle of it."""
+    demo = make(bin_dir, "--seed", "9", "--rws", "2", "--fault", "restart@scan+6:3")
+    try:
+        demo.start_sim(9)
+        demo.start_daemon()
+        begin = time.monotonic()
+        while not (demo.ask_status() or {}).get("controller", {}).get("subscribed"):
+            check(time.monotonic() - begin < 20, f"no subscription: {demo.ask_status()}")
+            time.sleep(0.1)
+        check(demo.ask_status()["controller"]["state"] == "motors off", f"controller {demo.ask_status()['controller']}")
+        demo.submit(9)
+        wait_state(demo, ["Scanning"], 120)
+        status = wait_state(demo, ["Faulted"], 60)
+        check(not status["armed"], "armed after the controller's restart")
+        begin = time.monotonic()
+        while not (status["links"]["robot controller"] and status["controller"]["subscribed"]):
+            check(time.monotonic() - begin < 30, f"no new subscription after the restart: {status}")
+            time.sleep(0.2)
+            status = demo.ask_status()
+        check(status["controller"]["state"] == "motors off" and status["state"] == "Faulted", f"after the restart: {status}")
+        operate(demo, "arm")
+        operate(demo, "abort")
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
+def wrong_certificate(bin_dir):
+    """A controller with another certificate than the pinned one hears nothing, above all no password."""
+    demo = make(bin_dir, "--rws", "2")
+    try:
+        os.remove(demo.certificate)
+        demo.start_sim(9)
+        demo.start_daemon()
+        log = os.path.join(demo.dir, "weldcelld.log")
+        begin = time.monotonic()
+        while "fingerprint" not in open(log).read():
+            check(time.monotonic() - begin < 20, f"it does not say why: {open(log).read()}")
+            time.sleep(0.1)
+        check("certificate_sha256" in open(log).read(), f"no mend: {open(log).read()}")
+        check(not demo.ask_status()["links"]["robot controller"], "it talks to a stranger")
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
 def bad_jobs(bin_dir):
     demo = make(bin_dir)
     try:

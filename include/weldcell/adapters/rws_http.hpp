@@ -1,5 +1,5 @@
-// RWS 1.0 over a socket: HTTP digest, session cookies, bounded rate. Owned by the rws thread; blocks for at
-// most the timeout.
+// RWS over a socket: HTTP digest in generation 1, TLS with a pinned certificate and HTTP basic in generation
+// 2, session cookies, bounded rate. Owned by the rws thread; blocks for at most the timeout.
 #pragma once
 
 #include <cstdint>
@@ -8,17 +8,25 @@
 
 #include "weldcell/base/time.hpp"
 #include "weldcell/ports/http.hpp"
+#include "weldcell/wire/rws_requests.hpp"
 
 namespace weldcell::adapters {
 
 struct RwsAccess {
   std::string host = "127.0.0.1";
   int port = 80;
+  wire::RwsGeneration generation = wire::RwsGeneration::One;
+  std::string
+      certificate_sha256;  ///< generation 2: 64 lower-case hexadecimal digits; nothing is sent to another
   std::string user = "Default User";
   std::string password;               ///< appears in no message of this adapter
   Nanoseconds timeout = 5 * kSecond;  ///< of connecting, and of each send and receive
-  Nanoseconds least_interval =
-      55 * kMillisecond;  ///< between starts of requests: the controller allows fewer than 20 a second
+  /// Between starts of requests, and how many may start at once: the controller allows fewer than 20 a
+  /// second.
+  Nanoseconds least_interval = kSecond / 16;
+  int burst = 2;
+  int overload_retries = 2;                         ///< after a 503, which did nothing
+  Nanoseconds overload_pause = 500 * kMillisecond;  ///< before each of them
 };
 
 struct RwsHttpCounters {
@@ -28,10 +36,11 @@ struct RwsHttpCounters {
   std::uint64_t reconnects = 0;
 };
 
-/// Replies of any status but 401 are handed up as they are (503 included: too many sessions or requests). A
-/// 401 is answered once with the server's new nonce; a second one is "http.refused". A kept connection that
-/// the controller had closed meanwhile is opened again once, for GET only: a POST may have taken effect and
-/// is never repeated.
+/// Replies of any status but 401 are handed up as they are (503 after the retries: too many sessions or
+/// requests). A 401 is answered once with the server's new nonce; a second one is "http.refused". A kept
+/// connection that the controller had closed meanwhile is opened again once, for GET only: a POST may have
+/// taken effect and is never repeated. "http.certificate": the controller shows another certificate than the
+/// pinned one; neither request nor credentials were sent.
 class RwsHttp final : public ports::HttpTransport {
  public:
   explicit RwsHttp(RwsAccess access);
@@ -45,10 +54,19 @@ class RwsHttp final : public ports::HttpTransport {
   /// one.
   void logout();
   const RwsHttpCounters& counters() const;
+  const RwsAccess& access() const;
+  /// The session's cookies as a Cookie header, "" before the first exchange.
+  std::string cookie_header() const;
+  /// Waits until one more request may start, and counts it: for what goes to the controller past exchange().
+  void take_turn();
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// Which generation answers there: TLS is 2, a digest challenge over plain HTTP is 1. Sends no credentials.
+/// Errors: "http.unreachable", "http.refused" (something else answers).
+Result<wire::RwsGeneration> find_rws_generation(const RwsAccess& access);
 
 }  // namespace weldcell::adapters

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "weldcell/adapters/rws_client.hpp"
+#include "weldcell/app/controller_watch.hpp"
 #include "weldcell/job/cell.hpp"
 
 namespace weldcell::app {
@@ -13,9 +14,11 @@ namespace weldcell::app {
 class RobotRunner {
  public:
   /// `resident_module` is the text of WeldcellEgm.mod; it is loaded when the controller does not have it as
-  /// it is.
-  RobotRunner(adapters::RwsClient& rws, std::string task, std::string resident_module)
-      : rws_(&rws), task_(std::move(task)), resident_(std::move(resident_module)) {}
+  /// it is. `view` is what a subscription tells: while it says that the program runs, the controller is asked
+  /// once a second instead of at every step; without it, at every step.
+  RobotRunner(adapters::RwsClient& rws, std::string task, std::string resident_module,
+              const ControllerView* view = nullptr)
+      : rws_(&rws), task_(std::move(task)), resident_(std::move(resident_module)), view_(view) {}
 
   /// Takes a request; one still under way is dropped without an answer (the cell has stopped waiting for it).
   void begin(const job::RobotRequest& request, HostTime now);
@@ -27,6 +30,9 @@ class RobotRunner {
  private:
   enum class Phase { Idle, Halt, AwaitHalt, Act, AwaitEnd };
   job::RobotReply answer(const Status& status);
+  bool worth_asking(HostTime now);
+  std::optional<job::RobotReply> await_halt(HostTime now);
+  std::optional<job::RobotReply> await_end(HostTime now);
   Status halt();
   Status act();
   Status make_ready();
@@ -38,9 +44,10 @@ class RobotRunner {
 
   adapters::RwsClient* rws_;
   std::string task_, resident_;
+  const ControllerView* view_;
   job::RobotRequest request_;
   Phase phase_ = Phase::Idle;
-  HostTime since_, next_poll_;
+  HostTime since_, next_poll_, asked_;
   bool resident_checked_ = false;
 };
 
