@@ -23,6 +23,9 @@ constexpr int kRegisters = wire::kPlcReadBase + wire::kPlcReadWords;
 constexpr std::size_t kQueuedOrders = 16;
 constexpr int kBacklog = 32;
 constexpr int kLostPeerMilliseconds = 5000;
+constexpr Nanoseconds kWindow = 100 * kMillisecond;  ///< in which a client's requests are counted
+constexpr Nanoseconds kLongestWait = 3600 * kSecond;
+constexpr Nanoseconds kNoDescriptorPause = 100 * kMillisecond;
 
 struct Client {
   Fd fd;
@@ -30,6 +33,8 @@ struct Client {
   std::size_t filled = 0;
   HostTime frame_begun;
   HostTime heard;
+  HostTime window_begun;
+  int requests = 0;  ///< since window_begun
 };
 
 struct FreeContext {
@@ -74,7 +79,10 @@ struct ModbusServer::State {
   std::array<PlcWords, kQueuedOrders> orders{};
   std::size_t first_order = 0, order_count = 0;
   PlcWords last{};
+  HostTime accept_from;  ///< no new client before: descriptors had run out
   ModbusCounters counters;
+
+  bool spent(Client& client, HostTime at) noexcept;
 
   void accept_all(HostTime at) noexcept;
   bool make_room(HostTime at) noexcept;
@@ -174,9 +182,16 @@ std::optional<PlcWords> ModbusServer::take_order() noexcept {
 void ModbusServer::poll(Nanoseconds timeout) noexcept {
   State& s = *state_;
   s.waits.clear();
-  s.waits.push_back({s.listener.get(), POLLIN, 0});
-  for (const Client& client : s.clients) s.waits.push_back({client.fd.get(), POLLIN, 0});
-  const Nanoseconds wait = std::max<Nanoseconds>(timeout, 0);
+  const HostTime begin = now();
+  const bool accepts = begin >= s.accept_from;
+  s.waits.push_back({s.listener.get(), static_cast<short>(accepts ? POLLIN : 0), 0});
+  bool held = !accepts;
+  for (Client& client : s.clients) {
+    const bool spent = s.spent(client, begin);
+    held = held || spent;
+    s.waits.push_back({client.fd.get(), static_cast<short>(spent ? 0 : POLLIN), 0});
+  }
+  const Nanoseconds wait = std::min(std::max<Nanoseconds>(timeout, 0), held ? kWindow / 10 : kLongestWait);
   const std::timespec limit{wait / kSecond, wait % kSecond};
   if (::ppoll(s.waits.data(), s.waits.size(), &limit, nullptr) < 0) return;
 
@@ -198,7 +213,13 @@ void ModbusServer::State::accept_all(HostTime at) noexcept {
     socklen_t bytes = sizeof from;
     Fd fd(
         ::accept4(listener.get(), reinterpret_cast<sockaddr*>(&from), &bytes, SOCK_CLOEXEC | SOCK_NONBLOCK));
-    if (!fd.valid()) return;
+    if (!fd.valid()) {
+      if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
+        ++counters.refused_clients;
+        accept_from = at + kNoDescriptorPause;
+      }
+      return;
+    }
     const bool known = allowed.empty() || std::ranges::count(allowed, from.sin_addr.s_addr) != 0;
     // poll() and the library's select() both need small descriptors.
     if (!known || fd.get() >= FD_SETSIZE || !make_room(at)) {
@@ -211,6 +232,14 @@ void ModbusServer::State::accept_all(HostTime at) noexcept {
     client.heard = at;
     clients.push_back(std::move(client));
   }
+}
+
+bool ModbusServer::State::spent(Client& client, HostTime at) noexcept {
+  if (at - client.window_begun >= kWindow) {
+    client.window_begun = at;
+    client.requests = 0;
+  }
+  return client.requests >= options.max_requests_per_second * (kWindow / kMillisecond) / 1000;
 }
 
 bool ModbusServer::State::make_room(HostTime at) noexcept {
@@ -240,6 +269,7 @@ bool ModbusServer::State::serve(Client& client, HostTime at) noexcept {
     if (size == 0 || rest.size() < static_cast<std::size_t>(size)) break;
     client.heard = at;
     client.frame_begun = at;
+    ++client.requests;
     if (!answer(client, rest.first(static_cast<std::size_t>(size)))) return false;
     begin += static_cast<std::size_t>(size);
   }

@@ -104,6 +104,12 @@ const fs::path& SpoolDir::root() const { return state_->root; }
 std::vector<SpoolEntry> SpoolDir::poll(Nanoseconds timeout) { return state_->watch.poll(timeout); }
 void SpoolDir::put_back(const SpoolEntry& entry) { state_->watch.put_back(entry.name); }
 
+std::optional<Error> SpoolDir::fault() const {
+  const int reason = state_->watch.look_failure();
+  if (reason == 0) return std::nullopt;
+  return io_fault(state_->place(SpoolPlace::Incoming), reason);
+}
+
 Result<SpoolDir> SpoolDir::open(const fs::path& root, const SpoolOptions& options) {
   std::error_code error;
   fs::create_directories(root.parent_path(), error);

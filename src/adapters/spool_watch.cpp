@@ -161,6 +161,9 @@ std::vector<SpoolEntry> SpoolWatch::scan(HostTime at) {
     look.entry.waited = at - seen.first_whole;
     whole.emplace_back(mark.newest_ns, std::move(look.entry));
   }
+  look_failure_ = error.value();
+  // A look that failed proves nothing about what is gone.
+  if (error) return {};
   std::erase_if(seen_, [](const auto& entry) { return !entry.second.present; });
   std::ranges::sort(whole, [](const auto& a, const auto& b) {
     return a.first != b.first ? a.first < b.first : a.second.name < b.second.name;

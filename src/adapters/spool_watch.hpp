@@ -20,6 +20,8 @@ class SpoolWatch {
   std::vector<SpoolEntry> poll(Nanoseconds timeout);
   void put_back(const std::string& name);
   void forget(const std::string& name) { seen_.erase(name); }
+  /// errno of the last look at incoming/, 0 when it went well.
+  int look_failure() const { return look_failure_; }
 
  private:
   struct Seen {
@@ -55,6 +57,7 @@ class SpoolWatch {
   std::map<std::string, Seen> seen_;
   HostTime look_again_{0};
   bool dirty_ = true;
+  int look_failure_ = 0;
 };
 
 }  // namespace weldcell::adapters

@@ -33,6 +33,14 @@ std::string record_path(const std::string& folder) {
   }
 }
 
+/// What must not happen before the state that allows it is durable.
+bool sets_in_motion(const job::Output& output) {
+  if (std::holds_alternative<job::StartMotion>(output)) return true;
+  const auto* request = std::get_if<job::RobotRequest>(&output);
+  return request != nullptr && request->task != job::RobotTask::Stop &&
+         request->task != job::RobotTask::Query;
+}
+
 }  // namespace
 
 CellThread::CellThread(Wiring& wiring, std::string arm_yaml)
@@ -102,7 +110,16 @@ void CellThread::feed(HostTime time, job::InputBody body) {
 }
 
 void CellThread::dispatch(const job::Outputs& outputs) {
-  for (const job::Output& output : outputs) dispatch(output);
+  unsaved_.clear();
+  bool held_back = false;
+  for (const job::Output& output : outputs) {
+    if (!unsaved_.empty() && sets_in_motion(output)) {
+      held_back = true;
+    } else {
+      dispatch(output);
+    }
+  }
+  if (held_back) feed(adapters::now(), job::StorageLost{unsaved_});
 }
 
 void CellThread::dispatch(const job::Output& output) {
@@ -126,6 +143,12 @@ void CellThread::dispatch(const job::Output& output) {
     wiring_.shown.push({show->drawing, show->step, active_ ? active_->folder : ""});
   } else if (const auto* state = std::get_if<job::SaveState>(&output)) {
     save(*state);
+  } else if (std::holds_alternative<job::ReturnJob>(output)) {
+    close_record();
+    story_.reset();
+    wiring_.returned.push(std::exchange(active_, nullptr));
+  } else if (const auto* choice = std::get_if<job::SelectJob>(&output)) {
+    wiring_.selected_job.store(choice->number, std::memory_order_relaxed);
   } else if (const auto* finish = std::get_if<job::FinishJob>(&output)) {
     end_job(*finish);
   } else if (const auto* event = std::get_if<job::LogEvent>(&output)) {
@@ -174,7 +197,10 @@ void CellThread::save(const job::SaveState& state) {
                             {"guidance_done", state.guidance_done},
                             {"weld_begun", state.weld_begun}};
   const Status written = write_file_durably(active_->folder + "/state.json", json.dump() + "\n");
-  if (!written.ok()) spdlog::error("{}", written.error().text());
+  if (!written.ok()) {
+    unsaved_ = written.error().text();
+    spdlog::error("{}", unsaved_);
+  }
   if (journal_) {
     record_->flush();
     journal_->flush(false);

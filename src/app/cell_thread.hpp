@@ -37,6 +37,7 @@ class CellThread {
   std::unique_ptr<RecordWriter> record_;
   std::shared_ptr<JobStory> story_;
   std::string accepted_at_;
+  std::string unsaved_;  ///< why the state of this step is not durable; empty when it is
   std::vector<std::shared_ptr<const plan::MotionPlan>> plans_;
   std::uint64_t laser_lost_ = 0, egm_lost_ = 0;
   HostTime last_tick_, solve_asked_;

@@ -163,12 +163,12 @@ int command_show(Arguments arguments) {
 }
 
 int command_operate(Arguments arguments) {
-  CommandLine line(
-      arguments,
-      std::string("usage: weldcell operate arm|start|confirm|stop|resume|reset|abort [--config CELL]\n"
-                  "What an operator may order. Nothing moves before 'arm'.\n") +
-          kConfigHelp,
-      {"config"}, {});
+  CommandLine line(arguments,
+                   std::string("usage: weldcell operate "
+                               "arm|start|confirm|stop|hold|unhold|resume|clear|reset|abort [--config CELL]\n"
+                               "What an operator may order. Nothing moves before 'arm'.\n") +
+                       kConfigHelp,
+                   {"config"}, {});
   if (line.exit_code()) return *line.exit_code();
   if (line.plain().size() != 1) return line.refuse("operate wants one order");
   const auto config = config_of(line);

@@ -27,6 +27,9 @@ std::string status_json(const Wiring& wiring) {
       {"seams_done", s.seams_done},
       {"seams", s.seams},
       {"fault", s.fault_text},
+      {"jobs_waiting", wiring.jobs_waiting.load()},
+      {"selected_job", wiring.selected_job.load()},
+      {"spool_fault", wiring.spool_fault()},
       {"fault_code", static_cast<int>(s.fault)},
       {"links", links},
       {"controller",
@@ -46,9 +49,10 @@ std::string status_json(const Wiring& wiring) {
 std::optional<wire::PlcCommand> order_of(const std::string& word) {
   using wire::PlcCommand;
   static const std::pair<const char*, PlcCommand> kOrders[] = {
-      {"arm", PlcCommand::Arm},    {"start", PlcCommand::Start},   {"confirm", PlcCommand::Confirm},
-      {"stop", PlcCommand::Stop},  {"resume", PlcCommand::Resume}, {"reset", PlcCommand::Reset},
-      {"abort", PlcCommand::Abort}};
+      {"arm", PlcCommand::Arm},     {"start", PlcCommand::Start},   {"confirm", PlcCommand::Confirm},
+      {"stop", PlcCommand::Stop},   {"resume", PlcCommand::Resume}, {"reset", PlcCommand::Reset},
+      {"abort", PlcCommand::Abort}, {"hold", PlcCommand::Hold},     {"unhold", PlcCommand::Unhold},
+      {"clear", PlcCommand::Clear}};
   for (const auto& [name, order] : kOrders) {
     if (word == name) return order;
   }

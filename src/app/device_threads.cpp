@@ -114,6 +114,7 @@ void run_plc(Wiring& wiring, adapters::ModbusServer& server) {
     }
     wire::PlcStatus status = wiring.status().plc;
     status.heartbeat = own_heartbeat;
+    status.jobs_waiting = wiring.jobs_waiting.load(std::memory_order_relaxed);
     server.set_status(wire::encode_plc_status(status, wiring.config.word_order));
   }
 }

@@ -10,7 +10,8 @@ std::string memory_json(const job::CellMemory& m) {
                         {"links", m.links},
                         {"next_request", m.next_request},
                         {"last_sequence", m.last_sequence},
-                        {"sequence_known", m.sequence_known}}
+                        {"sequence_known", m.sequence_known},
+                        {"selected_job", m.selected_job}}
       .dump();
 }
 
@@ -24,6 +25,7 @@ job::CellMemory memory_from_json(const std::string& text) {
   m.next_request = json.value("next_request", m.next_request);
   m.last_sequence = json.value("last_sequence", m.last_sequence);
   m.sequence_known = json.value("sequence_known", false);
+  m.selected_job = json.value("selected_job", 0);
   return m;
 }
 

@@ -97,6 +97,8 @@ int serve(const files::CellConfig& config, const std::string& ports_file) {
   adapters::ModbusOptions modbus_options;
   modbus_options.host = config.modbus.host;
   modbus_options.port = config.modbus.port;
+  modbus_options.allowed_clients = config.modbus_allow;
+  modbus_options.max_clients = config.modbus_max_clients;
   auto modbus = adapters::ModbusServer::listen(modbus_options);
   if (!modbus.ok()) return refuse(modbus.error().text());
   wiring->egm_port = egm->port();

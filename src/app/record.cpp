@@ -96,6 +96,9 @@ std::pair<std::string, json> small_input(const job::InputBody& body) {
           [](const Overrun& o) -> Named {
             return {"/cell/overrun", {{"link", static_cast<int>(o.link)}, {"lost", o.lost}}};
           },
+          [](const StorageLost& s) -> Named {
+            return {"/cell/storage_lost", {{"text", s.text}}};
+          },
           [](const auto&) -> Named {
             return {"", {}};
           },
@@ -132,6 +135,7 @@ std::optional<job::InputBody> small_input_from(const std::string& topic, const j
   if (topic == "/robot/reply")
     return RobotReply{j.at("id"),      j.at("ok"),         j.at("text"),
                       j.at("running"), j.at("seams_done"), j.at("seams_begun")};
+  if (topic == "/cell/storage_lost") return StorageLost{j.at("text")};
   if (topic == "/cell/overrun") return Overrun{static_cast<Link>(j.at("link").get<int>()), j.at("lost")};
   return std::nullopt;
 }

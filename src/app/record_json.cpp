@@ -121,6 +121,12 @@ std::string output_json(const job::Output& output) {
                                   {"guidance_done", s.guidance_done},
                                   {"weld_begun", s.weld_begun}};
                         },
+                        [](const ReturnJob&) -> json {
+                          return {{"output", "return_job"}};
+                        },
+                        [](const SelectJob& s) -> json {
+                          return {{"output", "select_job"}, {"number", s.number}};
+                        },
                         [](const FinishJob& f) -> json {
                           return {{"output", "finish"},
                                   {"accepted", f.accepted},

@@ -2,17 +2,51 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "app/places.hpp"
+#include "weldcell/adapters/host_clock.hpp"
 #include "weldcell/files/job_file.hpp"
 
 namespace weldcell::app {
 
 namespace {
 
+using adapters::SpoolMark;
+
 /// How long a job waits for a workpiece file that it names.
 constexpr Nanoseconds kFileWait = 15 * kSecond;
+/// How long an order to cancel waits for its job.
+constexpr Nanoseconds kCancelWait = 10 * kSecond;
+
+/// What the last process left behind in state.json.
+struct Left {
+  bool ended = false, accepted = false, begun = false;
+};
+
+Left read_left(const std::string& folder, job::JobArrived& arrived) {
+  const auto state = read_file(folder + "/state.json");
+  if (!state.ok()) return {};  // killed before its first step: not begun
+  const auto json = nlohmann::json::parse(*state, nullptr, false);
+  if (!json.is_object()) {
+    // Nobody knows how far it came; the controller is asked before any arc.
+    arrived.weld_begun = true;
+    return {false, false, true};
+  }
+  const std::string last = json.value("state", "");
+  arrived.seams_done = json.value("seams_done", 0);
+  arrived.guidance_done = json.value("guidance_done", false);
+  arrived.weld_begun = json.value("weld_begun", false);
+  const bool before_start = last == "Idle" || last == "Importing" || last == "Planning" || last == "Ready";
+  const bool begun = !before_start || arrived.seams_done > 0 || arrived.guidance_done || arrived.weld_begun;
+  return {last == "Done" || last == "Failed", last == "Done", begun};
+}
+
+/// Fewer than these of a job's own faults; everything else is the disk's or the folder's.
+bool fault_of_the_disk(const Error& fault) {
+  return fault.code == "spool.io" || fault.code == "spool.permission";
+}
 
 }  // namespace
 
@@ -26,7 +60,6 @@ void SpoolKeeper::find_interrupted() {
     auto job = std::make_shared<ActiveJob>();
     job->folder = found.folder.string();
     job->arrived.id = found.name;
-    job->arrived.interrupted = true;
     const auto text = read_file(found.job_file.string());
     auto order = text.ok() ? files::parse_job(*text, found.job_file.string())
                            : std::variant<job::JobOrder, files::Faults>(files::Faults{});
@@ -38,33 +71,34 @@ void SpoolKeeper::find_interrupted() {
     job->arrived.order = std::get<job::JobOrder>(order);
     job->arrived.number = job->arrived.order.number;
     job->job_yaml = *text;
-    if (const auto state = read_file(job->folder + "/state.json"); state.ok()) {
-      const auto json = nlohmann::json::parse(*state, nullptr, false);
-      if (json.is_object()) {
-        const std::string last = json.value("state", "");
-        if (last == "Done" || last == "Failed") {
-          // It had ended; only its move out of active/ was cut off.
-          wiring_.ended.push({found.name, last == "Done"});
-          continue;
-        }
-        job->arrived.seams_done = json.value("seams_done", 0);
-        job->arrived.guidance_done = json.value("guidance_done", false);
-        job->arrived.weld_begun = json.value("weld_begun", false);
-      }
+    const Left left = read_left(job->folder, job->arrived);
+    if (left.ended) {
+      // Only its move out of active/ was cut off.
+      wiring_.ended.push({found.name, left.accepted});
+      continue;
     }
-    interrupted_.push_back(std::move(job));
+    job->arrived.interrupted = left.begun;
+    if (left.begun) {
+      interrupted_.push_back(std::move(job));
+    } else {
+      const job::JobOrder& o = job->arrived.order;
+      waiting_.push_back({{}, job, o.name, o.number, o.priority});
+    }
   }
 }
 
 void SpoolKeeper::step(Nanoseconds timeout) {
   put_away();
-  for (adapters::SpoolEntry& entry : spool_.poll(timeout)) {
-    if (!entry.problem.empty()) {
-      reject(entry, entry.problem);
-    } else {
-      waiting_.push_back(std::move(entry));
-    }
+  take_back();
+  std::vector<adapters::SpoolEntry> entries = spool_.poll(timeout);
+  if (const auto fault = spool_.fault()) {
+    tell(fault->text());
+  } else if (!told_.empty() && waiting_.empty()) {
+    tell("");
   }
+  for (adapters::SpoolEntry& entry : entries) offer(std::move(entry));
+  obey_cancels(adapters::now());
+  count_waiting();
   // handed_over_ holds back until the cell has seen the last one and says that it is busy.
   if (!wiring_.takes_jobs.load(std::memory_order_relaxed)) {
     handed_over_ = false;
@@ -73,14 +107,89 @@ void SpoolKeeper::step(Nanoseconds timeout) {
   if (handed_over_) return;
   if (!interrupted_.empty()) {
     if (hand_over(interrupted_.front())) interrupted_.pop_front();
-  } else if (!waiting_.empty()) {
-    const adapters::SpoolEntry entry = std::move(waiting_.front());
-    waiting_.pop_front();
-    look_at(entry);
+  } else if (const auto first = next(); first != waiting_.end()) {
+    const Waiting chosen = std::move(*first);
+    waiting_.erase(first);
+    take(chosen);
   }
 }
 
-void SpoolKeeper::look_at(const adapters::SpoolEntry& entry) {
+void SpoolKeeper::offer(adapters::SpoolEntry entry) {
+  std::erase_if(waiting_, [&](const Waiting& w) { return !w.taken && w.entry.name == entry.name; });
+  if (!entry.problem.empty()) {
+    reject(entry, entry.problem);
+    return;
+  }
+  auto read = files::read_job_file(entry.job_file.string());
+  if (const auto* faults = std::get_if<files::Faults>(&read)) {
+    reject(entry, files::text(*faults));
+    return;
+  }
+  const auto& order = std::get<job::JobOrder>(read);
+  waiting_.push_back({std::move(entry), nullptr, order.name, order.number, order.priority});
+}
+
+void SpoolKeeper::take_back() {
+  for (const std::shared_ptr<const ActiveJob>& job : wiring_.returned.take_all()) {
+    const job::JobOrder& order = job->arrived.order;
+    waiting_.push_front({{}, job, order.name, order.number, order.priority});
+    handed_over_ = false;
+    spdlog::info("job '{}' waits again", order.name);
+  }
+}
+
+void SpoolKeeper::obey_cancels(HostTime now) {
+  const std::vector<std::string> ordered = adapters::marked_jobs(spool_.root(), SpoolMark::Cancel);
+  for (const std::string& job : ordered) {
+    const HostTime first = cancels_.try_emplace(job, now).first->second;
+    const bool over = cancel(job);
+    if (!over && now - first < kCancelWait) continue;
+    if (!over) spdlog::warn("no job '{}' to cancel", job);
+    adapters::unmark_job(spool_.root(), SpoolMark::Cancel, job);
+    adapters::unmark_job(spool_.root(), SpoolMark::Hold, job);
+    cancels_.erase(job);
+  }
+}
+
+bool SpoolKeeper::cancel(const std::string& job) {
+  const auto found = std::ranges::find(waiting_, job, &Waiting::job);
+  if (found != waiting_.end()) {
+    const Waiting chosen = std::move(*found);
+    waiting_.erase(found);
+    spdlog::info("job '{}' cancelled", job);
+    if (chosen.taken) {
+      wiring_.ended.push({chosen.taken->arrived.id, false});
+    } else {
+      reject(chosen.entry, "cancelled by a person");
+    }
+    return true;
+  }
+  if (wiring_.status().job != job || wiring_.takes_jobs.load(std::memory_order_relaxed)) return false;
+  wiring_.inbox.push({job::OperatorCommand{wire::PlcCommand::Abort, "cancel"}, nullptr, nullptr});
+  return true;
+}
+
+bool SpoolKeeper::held(const Waiting& waiting) const {
+  return adapters::job_marked(spool_.root(), SpoolMark::Hold, waiting.job);
+}
+
+std::deque<SpoolKeeper::Waiting>::iterator SpoolKeeper::next() {
+  const std::int32_t selected = wiring_.selected_job.load(std::memory_order_relaxed);
+  auto best = waiting_.end();
+  for (auto at = waiting_.begin(); at != waiting_.end(); ++at) {
+    if (selected != 0 && (at->number > 0 ? at->number : -1) != selected) continue;
+    if (best != waiting_.end() && at->priority <= best->priority) continue;
+    if (!held(*at)) best = at;
+  }
+  return best;
+}
+
+void SpoolKeeper::take(const Waiting& waiting) {
+  if (waiting.taken) {
+    if (!hand_over(waiting.taken)) waiting_.push_front(waiting);
+    return;
+  }
+  const adapters::SpoolEntry& entry = waiting.entry;
   auto read = files::read_job_file(entry.job_file.string());
   if (const auto* faults = std::get_if<files::Faults>(&read)) {
     reject(entry, files::text(*faults));
@@ -93,19 +202,24 @@ void SpoolKeeper::look_at(const adapters::SpoolEntry& entry) {
   auto taken = spool_.take(entry, order.name, needed);
   if (!taken.ok()) {
     const Error& fault = taken.error();
-    if (fault.code == "spool.missing" && entry.waited < kFileWait) {
+    if (fault_of_the_disk(fault)) {
+      // No fault of the job's: it waits until the disk is well again.
+      tell(fault.text());
+      spool_.put_back(entry);
+    } else if (fault.code == "spool.missing" && entry.waited < kFileWait) {
       spool_.put_back(entry);
     } else {
       reject(entry, fault.text());
     }
     return;
   }
+  tell("");
   job->folder = taken->folder.string();
   job->arrived.id = taken->name;
   job->arrived.order = order;
   job->arrived.number = order.number;
   spdlog::info("job '{}' taken from the spool", order.name);
-  if (!hand_over(job)) interrupted_.push_back(job);
+  if (!hand_over(job)) waiting_.push_front({{}, job, order.name, order.number, order.priority});
 }
 
 bool SpoolKeeper::hand_over(std::shared_ptr<const ActiveJob> job) {
@@ -115,9 +229,31 @@ bool SpoolKeeper::hand_over(std::shared_ptr<const ActiveJob> job) {
 }
 
 void SpoolKeeper::reject(const adapters::SpoolEntry& entry, const std::string& reason) {
-  spdlog::error("rejected {}: {}", entry.name, reason);
   const Status status = spool_.reject(entry, reason);
-  if (!status.ok()) spdlog::error("{}", status.error().text());
+  if (status.ok()) {
+    spdlog::error("rejected {}: {}", entry.name, reason);
+  } else if (status.error().code != "spool.missing") {
+    tell(status.error().text());
+    spool_.put_back(entry);
+  }
+}
+
+void SpoolKeeper::count_waiting() {
+  std::size_t count = 0;
+  for (const Waiting& waiting : waiting_) count += held(waiting) ? 0 : 1;
+  wiring_.jobs_waiting.store(static_cast<std::uint16_t>(std::min<std::size_t>(count, 0xFFFF)),
+                             std::memory_order_relaxed);
+}
+
+void SpoolKeeper::tell(const std::string& fault) {
+  if (fault == told_) return;
+  told_ = fault;
+  wiring_.publish_spool_fault(fault);
+  if (fault.empty()) {
+    spdlog::info("the spool is well again");
+  } else {
+    spdlog::error("{}; what waits there keeps waiting", fault);
+  }
 }
 
 void SpoolKeeper::put_away() {

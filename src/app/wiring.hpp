@@ -81,11 +81,14 @@ struct Wiring {
   Mailbox<std::function<void()>> work{16};        ///< solver; full cannot happen: one order a job step
   Mailbox<Shown> shown{16};                       ///< full: a picture is skipped
   Mailbox<EndedJob> ended{64};
+  Mailbox<std::shared_ptr<const ActiveJob>> returned{4};  ///< full cannot happen: one job at a time
 
   std::atomic<const plan::MotionPlan*> offered_plan{nullptr};  ///< cell -> egm; the cell keeps the plan alive
   std::atomic<bool> stopping{false};
   std::atomic<bool> wants_laser{false};
   std::atomic<bool> takes_jobs{true};
+  std::atomic<std::int32_t> selected_job{0};   ///< by the PLC; 0 = the spool's order
+  std::atomic<std::uint16_t> jobs_waiting{0};  ///< in the spool, without those on hold
   std::array<std::atomic<std::uint64_t>, kThreads> heartbeats{};
   std::atomic<int> egm_port{0}, modbus_port{0};
   std::atomic<wire::ControllerState> controller_state{};  ///< rws -> operator's status
@@ -100,6 +103,15 @@ struct Wiring {
     const std::lock_guard lock(status_mutex);
     return last_status;
   }
+  /// What hinders the spool, "" when nothing does.
+  std::string spool_fault() const {
+    const std::lock_guard lock(status_mutex);
+    return last_spool_fault;
+  }
+  void publish_spool_fault(const std::string& text) {
+    const std::lock_guard lock(status_mutex);
+    last_spool_fault = text;
+  }
   void publish(const job::CellStatus& s) {
     const std::lock_guard lock(status_mutex);
     last_status = s;
@@ -108,6 +120,7 @@ struct Wiring {
  private:
   mutable std::mutex status_mutex;
   job::CellStatus last_status;
+  std::string last_spool_fault;
 };
 
 }  // namespace weldcell::app

@@ -220,11 +220,42 @@ void read_weld(Map& map, cell::WeldSetup& weld) {
   map.finish();
 }
 
+bool is_ipv4(const Node& node) {
+  if (node.kind != Node::Kind::Scalar) return false;
+  int parts = 0;
+  const char* at = node.text.data();
+  const char* const end = at + node.text.size();
+  for (;; ++parts) {
+    int part = -1;
+    const auto [rest, error] = std::from_chars(at, end, part);
+    if (error != std::errc{} || part < 0 || part > 255 || rest - at > 3) return false;
+    if (rest == end) return parts == 3;
+    if (*rest != '.' || parts == 3) return false;
+    at = rest + 1;
+  }
+}
+
 void read_modbus(Map& map, CellConfig& config) {
   read_endpoint(map, "listen", config.modbus, true);
   static constexpr Choice<wire::WordOrder> kOrders[] = {{"abcd", wire::WordOrder::Abcd},
                                                         {"cdab", wire::WordOrder::Cdab}};
   map.choice("word_order", config.word_order, kOrders);
+  map.integer("max_clients", config.modbus_max_clients, {1, 32});
+  if (const Node* allow = map.sequence("allow")) {
+    for (const Node& address : allow->items) {
+      if (is_ipv4(address)) {
+        config.modbus_allow.push_back(address.text);
+      } else {
+        map.fault_at(address.line, map.dotted("allow"), address.describe() + " is no IPv4 address",
+                     "write the PLC's address, e.g. [192.168.126.10]");
+      }
+    }
+  }
+  const bool loopback = config.modbus.host.rfind("127.", 0) == 0;
+  if (!loopback && config.modbus_allow.empty() && !map.has("allow")) {
+    map.fault("listen", "listens on the network and would serve anybody there",
+              "name who may connect: allow: [<the PLC's address>]");
+  }
   map.finish();
 }
 

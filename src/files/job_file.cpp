@@ -115,6 +115,7 @@ std::variant<job::JobOrder, Faults> parse_job(std::string_view text, const std::
   job::JobOrder order;
   read_name(top, order);
   top.integer("number", order.number, {0, 1'000'000});
+  top.integer("priority", order.priority, {0, 9});
   read_workpiece_name(top, order);
   read_revision(top, order);
   section(top, "cad", read_cad, order.cad);

@@ -18,31 +18,9 @@ const char* to_string(Link link) {
 }
 
 const char* to_string(FaultCode code) {
-  switch (code) {
-    case FaultCode::None:
-      return "none";
-    case FaultCode::EgmLost:
-      return "EGM frames stopped";
-    case FaultCode::EgmNotStarted:
-      return "EGM did not start";
-    case FaultCode::MotionRefused:
-      return "motion refused";
-    case FaultCode::RobotStopped:
-      return "robot stopped";
-    case FaultCode::LaserLost:
-      return "laser lost";
-    case FaultCode::LaserOverrun:
-      return "laser data lost";
-    case FaultCode::RobotCommand:
-      return "robot command failed";
-    case FaultCode::ProgramStopped:
-      return "weld program stopped early";
-    case FaultCode::PlcLost:
-      return "PLC lost";
-    case FaultCode::StoppedByPerson:
-      return "stopped by a person";
-  }
-  return "?";
+  if (code == FaultCode::None) return "none";
+  const wire::PlcAlarm* alarm = wire::plc_alarm(static_cast<std::uint16_t>(code));
+  return alarm != nullptr ? alarm->text : "?";
 }
 
 const char* to_string(RobotTask task) {
@@ -79,7 +57,8 @@ Outputs Cell::step(const Input& input) {
 }
 
 CellMemory Cell::memory() const {
-  return {status_.state, status_.armed, status_.links, next_request_, last_sequence_, sequence_known_};
+  return {status_.state,  status_.armed,   status_.links, next_request_,
+          last_sequence_, sequence_known_, selected_job_};
 }
 
 void Cell::recall(const CellMemory& memory) {
@@ -89,6 +68,7 @@ void Cell::recall(const CellMemory& memory) {
   next_request_ = memory.next_request;
   last_sequence_ = memory.last_sequence;
   sequence_known_ = memory.sequence_known;
+  selected_job_ = memory.selected_job;
   refresh_plc();
 }
 
@@ -97,7 +77,9 @@ bool Cell::wants_laser() const {
 }
 
 bool Cell::takes_jobs() const {
-  return status_.state == State::Idle || status_.state == State::Done || status_.state == State::Failed;
+  // Complete and Stopped stay for a PLC to read until it resets.
+  const bool plc_reads = plc_required_ && status_.links[static_cast<std::size_t>(Link::Plc)];
+  return status_.state == State::Idle || (ended(status_.state) && !plc_reads);
 }
 
 // ---- inputs ----
@@ -211,13 +193,24 @@ void Cell::on(const PlcInput& input) {
   sequence_known_ = true;
   last_sequence_ = order.command_sequence;
   status_.plc.command_ack = order.command_sequence;
-  if (fresh) status_.plc.command_result = static_cast<std::uint16_t>(command(order.command, "plc"));
+  if (fresh)
+    status_.plc.command_result = static_cast<std::uint16_t>(command(order.command, order.job_number, "plc"));
 }
 
-void Cell::on(const OperatorCommand& order) { command(order.command, order.who); }
+void Cell::on(const OperatorCommand& order) { command(order.command, 0, order.who); }
+
+void Cell::on(const StorageLost& lost) { fault(FaultCode::StateNotSaved, lost.text); }
 
 void Cell::on(const JobArrived& arrived) {
-  WELDCELL_ASSERT(takes_jobs());
+  WELDCELL_ASSERT(status_.state == State::Idle || ended(status_.state));
+  if (selected_job_ != 0 && !arrived.interrupted) {
+    if (shown_number(arrived.order) != selected_job_) {
+      // It was on its way while the PLC chose another one.
+      out_.push_back(ReturnJob{});
+      return;
+    }
+    select_job(0);
+  }
   job_ = JobInput{arrived.order, {}};
   job_id_ = arrived.id;
   prepared_.reset();
@@ -225,6 +218,7 @@ void Cell::on(const JobArrived& arrived) {
   solution_.reset();
   scan_.reset();
   failure_.clear();
+  cleared_ = false;
   resuming_ = false;
   guidance_done_ = arrived.guidance_done;
   guide_step_ = 0;

@@ -11,7 +11,7 @@ namespace {
 
 std::int32_t rounded(double value) { return static_cast<std::int32_t>(std::lround(value)); }
 
-wire::PackState pack_state(State state) {
+wire::PackState pack_state(State state, FaultCode fault, bool cleared) {
   switch (state) {
     case State::Idle:
     case State::Importing:
@@ -23,8 +23,11 @@ wire::PackState pack_state(State state) {
     case State::Failed:
       return wire::PackState::Stopped;
     case State::Faulted:
+      if (fault == FaultCode::Held) return wire::PackState::Held;
+      if (fault == FaultCode::StoppedByPerson) return wire::PackState::Stopped;
+      [[fallthrough]];
     case State::Interrupted:
-      return wire::PackState::Aborted;
+      return cleared ? wire::PackState::Stopped : wire::PackState::Aborted;
     default:
       return wire::PackState::Execute;
   }
@@ -42,6 +45,16 @@ std::string order_name(wire::PlcCommand order) {
       return "start";
     case PlcCommand::Stop:
       return "stop";
+    case PlcCommand::Hold:
+      return "hold";
+    case PlcCommand::Unhold:
+      return "unhold";
+    case PlcCommand::Suspend:
+      return "suspend";
+    case PlcCommand::Unsuspend:
+      return "unsuspend";
+    case PlcCommand::Select:
+      return "select";
     case PlcCommand::Abort:
       return "abort";
     case PlcCommand::Clear:
@@ -210,6 +223,10 @@ void Cell::act(Action action) {
                     failure_.empty() ? "aborted by a person" : failure_);
       }
       break;
+    case Action::PutBack:
+      set_armed(false);
+      out_.push_back(ReturnJob{});
+      [[fallthrough]];
     case Action::Clear:
       job_.reset();
       status_.job.clear();
@@ -270,6 +287,7 @@ void Cell::fault(FaultCode code, const std::string& text) {
   scan_.reset();
   status_.fault = code;
   status_.fault_text = text;
+  cleared_ = false;
   status_.guide_step = 0;
   out_.push_back(StopMotion{});
   request(RobotTask::Stop);
@@ -291,42 +309,43 @@ void Cell::finish_with(bool accepted, const std::string& verdict, const std::str
   out_.push_back(FinishJob{accepted, verdict, words});
 }
 
-int Cell::command(wire::PlcCommand order, const std::string& who) {
-  constexpr int kDone = 0, kRefused = 1, kUnknown = 2;
+wire::PlcResult Cell::command(wire::PlcCommand order, std::int32_t job_number, const std::string& who) {
   const std::string name = order_name(order);
   if (name.empty()) {
     refusal_ = "unknown command " + std::to_string(static_cast<int>(order)) + " from " + who;
     log(LogEvent::Level::Warning, refusal_);
-    return kUnknown;
+    return wire::PlcResult::Unknown;
   }
   log(LogEvent::Level::Info, name + " from " + who);
-  const std::string hindrance = obey(order, who);
-  if (hindrance.empty()) return kDone;
-  refusal_ = name + " refused: " + hindrance;
+  const Answer answer = obey(order, job_number, who);
+  if (answer.result == wire::PlcResult::Done) return answer.result;
+  refusal_ = name + " refused: " + answer.hindrance;
   log(LogEvent::Level::Warning, refusal_);
-  return kRefused;
+  return answer.result;
 }
 
-std::string Cell::obey(wire::PlcCommand order, const std::string& who) {
+Cell::Answer Cell::obey(wire::PlcCommand order, std::int32_t job_number, const std::string& who) {
   using wire::PlcCommand;
-  const std::string not_now = std::string("nothing waits for it in state ") + to_string(status_.state);
-  const auto outcome = [&](bool taken) { return taken ? std::string{} : not_now; };
+  const Answer not_now{wire::PlcResult::Refused,
+                       std::string("nothing waits for it in state ") + to_string(status_.state)};
+  const auto outcome = [&](bool taken) { return taken ? Answer{} : not_now; };
+  const bool stands = status_.state == State::Faulted || status_.state == State::Interrupted;
   switch (order) {
     case PlcCommand::None:
-    case PlcCommand::Clear:
       return {};
+    case PlcCommand::Clear:
+      if (stands) cleared_ = true;
+      return outcome(stands);
     case PlcCommand::Arm:
+      cleared_ = true;
       set_armed(true);
       return {};
     case PlcCommand::Start:
-    case PlcCommand::Resume: {
-      const bool start = order == PlcCommand::Start;
-      const bool waits = start ? status_.state == State::Ready
-                               : status_.state == State::Faulted || status_.state == State::Interrupted;
-      if (!waits) return not_now;
-      if (const std::string hindrance = start_hindrance(); !hindrance.empty()) return hindrance;
-      return outcome(fire(start ? Event::Start : Event::Resume));
-    }
+    case PlcCommand::Resume:
+    case PlcCommand::Unhold:
+      return start_or_resume(order, job_number);
+    case PlcCommand::Select:
+      return select(job_number);
     case PlcCommand::Confirm:
       return outcome(fire(Event::Confirm));
     case PlcCommand::Reset:
@@ -335,6 +354,13 @@ std::string Cell::obey(wire::PlcCommand order, const std::string& who) {
       if (!under_way(status_.state)) return not_now;
       fault(FaultCode::StoppedByPerson, "stop from " + who);
       return {};
+    case PlcCommand::Hold:
+      if (status_.plc.state != wire::PackState::Execute) return not_now;
+      fault(FaultCode::Held, "hold from " + who);
+      return {};
+    case PlcCommand::Suspend:
+    case PlcCommand::Unsuspend:
+      return {wire::PlcResult::Refused, "the cell is never starved or blocked: use hold"};
     case PlcCommand::Abort:
       failure_ = "aborted by " + who;
       return outcome(fire(Event::Abort));
@@ -342,12 +368,50 @@ std::string Cell::obey(wire::PlcCommand order, const std::string& who) {
   return not_now;
 }
 
-std::string Cell::start_hindrance() const {
-  if (!status_.armed) return "not armed: a person must arm the cell first";
-  if (!status_.links[static_cast<std::size_t>(Link::Rws)]) return "the robot controller is not reachable";
-  if (!status_.links[static_cast<std::size_t>(Link::Laser)]) return "the laser is not connected";
-  if (plc_required_ && !status_.links[static_cast<std::size_t>(Link::Plc)])
-    return "the PLC's heartbeat is missing";
+Cell::Answer Cell::start_or_resume(wire::PlcCommand order, std::int32_t job_number) {
+  const bool start = order == wire::PlcCommand::Start;
+  const bool held = status_.state == State::Faulted && status_.fault == FaultCode::Held;
+  const bool waits = start ? status_.state == State::Ready
+                     : order == wire::PlcCommand::Unhold
+                         ? held
+                         : status_.state == State::Faulted || status_.state == State::Interrupted;
+  const Answer not_now{wire::PlcResult::Refused,
+                       std::string("nothing waits for it in state ") + to_string(status_.state)};
+  if (!waits) return not_now;
+  if (start && job_number != 0 && job_number != shown_number(job_->order)) {
+    return {wire::PlcResult::OtherJob, "job number " + std::to_string(shown_number(job_->order)) +
+                                           " stands ready, not " + std::to_string(job_number) +
+                                           ": select it first"};
+  }
+  if (Answer hindrance = start_hindrance(); hindrance.result != wire::PlcResult::Done) return hindrance;
+  return fire(start ? Event::Start : Event::Resume) ? Answer{} : not_now;
+}
+
+Cell::Answer Cell::select(std::int32_t job_number) {
+  const bool ready = status_.state == State::Ready;
+  if (!ready && status_.state != State::Idle && !ended(status_.state))
+    return {wire::PlcResult::Refused, std::string("a job is under way: ") + to_string(status_.state)};
+  const bool stands_ready = ready && job_number == shown_number(job_->order);
+  select_job(stands_ready ? 0 : job_number);
+  if (ready && job_number != 0 && !stands_ready) fire(Event::PutBack);
+  return {};
+}
+
+void Cell::select_job(std::int32_t job_number) {
+  if (job_number == selected_job_) return;
+  selected_job_ = job_number;
+  out_.push_back(SelectJob{job_number});
+}
+
+std::int32_t Cell::shown_number(const JobOrder& order) { return order.number > 0 ? order.number : -1; }
+
+Cell::Answer Cell::start_hindrance() const {
+  using wire::PlcResult;
+  const auto down = [&](Link link) { return !status_.links[static_cast<std::size_t>(link)]; };
+  if (!status_.armed) return {PlcResult::NotArmed, "not armed: a person must arm the cell first"};
+  if (down(Link::Rws)) return {PlcResult::LinkMissing, "the robot controller is not reachable"};
+  if (down(Link::Laser)) return {PlcResult::LinkMissing, "the laser is not connected"};
+  if (plc_required_ && down(Link::Plc)) return {PlcResult::LinkMissing, "the PLC's heartbeat is missing"};
   return {};
 }
 
@@ -360,17 +424,25 @@ void Cell::log(LogEvent::Level level, const std::string& text) { out_.push_back(
 
 void Cell::refresh_plc() {
   wire::PlcStatus& plc = status_.plc;
-  plc.state = pack_state(status_.state);
+  plc.state = pack_state(status_.state, status_.fault, cleared_);
   plc.phase = static_cast<std::uint16_t>(status_.state);
   plc.armed = status_.armed ? 1 : 0;
   plc.guide_step = static_cast<std::uint16_t>(status_.guide_step);
   plc.guide_member = plc.guide_step;
-  plc.fault_code = static_cast<std::uint16_t>(status_.fault);
+  const bool faulted = status_.fault != FaultCode::None;
+  plc.fault_code = faulted                               ? static_cast<std::uint16_t>(status_.fault)
+                   : status_.state == State::Interrupted ? wire::kAlarmInterrupted
+                   : status_.state == State::Failed      ? wire::kAlarmJobFailed
+                                                         : std::uint16_t{0};
+  plc.fault_detail = faulted ? static_cast<std::int32_t>(resume_state_) : 0;
+  const wire::PlcAlarm* alarm = wire::plc_alarm(plc.fault_code);
+  plc.fault_severity = alarm != nullptr ? alarm->severity : wire::PlcSeverity::None;
+  plc.selected_job = selected_job_;
   plc.progress_percent = static_cast<std::uint16_t>(std::clamp(status_.progress, 0.0, 1.0) * 100);
   plc.seams_done = static_cast<std::uint16_t>(status_.seams_done);
   const bool waits = job_ && status_.state != State::Importing && status_.state != State::Planning &&
                      status_.state != State::Idle && status_.state != State::Failed;
-  plc.job_number = waits ? std::max(1, job_->order.number) : 0;
+  plc.job_number = waits ? shown_number(job_->order) : 0;
   if (solution_) {
     plc.x_um = rounded(solution_->found.pose.x_mm * 1000);
     plc.y_um = rounded(solution_->found.pose.y_mm * 1000);

@@ -12,9 +12,9 @@ const char* to_string(State s) {
 }
 
 const char* to_string(Event e) {
-  static constexpr std::array kNames{"JobArrived", "JobFound",     "Imported", "Planned",  "StepFailed",
-                                     "Start",      "RobotDone",    "Confirm",  "EgmReady", "MotionDone",
-                                     "Solved",     "ProgramEnded", "Abort",    "Reset",    "Resume"};
+  static constexpr std::array kNames{
+      "JobArrived", "JobFound",   "Imported", "Planned",      "StepFailed", "Start", "RobotDone", "Confirm",
+      "EgmReady",   "MotionDone", "Solved",   "ProgramEnded", "Abort",      "Reset", "Resume",    "PutBack"};
   return kNames[static_cast<std::size_t>(e)];
 }
 
@@ -29,7 +29,7 @@ const char* to_string(Guard g) {
 const char* to_string(Action a) {
   static constexpr std::array kNames{"None",      "Import",     "Plan",    "MoveToGuide", "ShowStep",
                                      "BeginScan", "FollowPlan", "Solve",   "PlanPass",    "Upload",
-                                     "Weld",      "Finish",     "Recover", "Clear"};
+                                     "Weld",      "Finish",     "Recover", "Clear",       "PutBack"};
   return kNames[static_cast<std::size_t>(a)];
 }
 

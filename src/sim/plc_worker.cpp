@@ -7,6 +7,7 @@ using wire::PlcCommand;
 
 namespace {
 constexpr double kAckPatience_s = 2.0;
+constexpr int kPhaseFaulted = 14, kPhaseInterrupted = 15;  // docs/PLC.md
 constexpr double kRetry_s = 1.0;  // a refused command is tried again, without filling the cell's log
 }  // namespace
 
@@ -24,13 +25,14 @@ PlcCommand PlcWorker::wanted(const wire::PlcStatus& status, double now_s) {
       if (step_ == 0 || confirmed_ == step_ || now_s - step_seen_s_ < confirm_after_s_)
         return PlcCommand::None;
       return PlcCommand::Confirm;
-    case PackState::Stopped:
     case PackState::Complete:
       return PlcCommand::Reset;
-    case PackState::Aborted:
+    case PackState::Stopped:
+      if (status.phase != kPhaseFaulted && status.phase != kPhaseInterrupted) return PlcCommand::Reset;
       if (!rearm_) return PlcCommand::None;
-      if (last_ != PlcCommand::Clear && !status.armed) return PlcCommand::Clear;
       return status.armed ? PlcCommand::Resume : PlcCommand::Arm;
+    case PackState::Aborted:
+      return rearm_ ? PlcCommand::Clear : PlcCommand::None;
     default:
       return PlcCommand::None;
   }

@@ -76,7 +76,8 @@ constexpr std::array kOrderRows{
     order_row<&PlcOrder::command_sequence>("command_sequence", 1, "",
                                            "a command counts once, when this number changes"),
     order_row<&PlcOrder::command>("command", 2, "", "see the commands below"),
-    order_row<&PlcOrder::job_number>("job_number", 4, "", "job that Start means; 0 = the oldest one waiting"),
+    order_row<&PlcOrder::job_number>("job_number", 4, "",
+                                     "job that Start and Select mean; 0 = whichever comes first"),
 };
 
 constexpr std::array kStatusRows{
@@ -88,15 +89,16 @@ constexpr std::array kStatusRows{
     status_row<&PlcStatus::command_ack>("command_ack", 4, "", "sequence number of the command taken last"),
     status_row<&PlcStatus::command_result>("command_result", 5, "", "of that command, see the results below"),
     status_row<&PlcStatus::state>("state", 6, "", "PackML state, see below"),
-    status_row<&PlcStatus::mode>("mode", 7, "", "PackML mode: 1 production"),
+    status_row<&PlcStatus::mode>("mode", 7, "", "PackML mode, see below"),
     status_row<&PlcStatus::phase>("phase", 8, "", "phase of the job, see below"),
     status_row<&PlcStatus::armed>("armed", 9, "", "1 = a person has allowed motion"),
     status_row<&PlcStatus::guide_step>("guide_step", 10, "", "step of the guidance shown, from 1; 0 = none"),
     status_row<&PlcStatus::guide_member>("guide_member", 11, "", "number of the member to place; 0 = none"),
-    status_row<&PlcStatus::fault_code>("fault_code", 12, "", "0 = no fault"),
+    status_row<&PlcStatus::fault_code>("fault_code", 12, "", "number in the alarm list, see below; 0 = none"),
     status_row<&PlcStatus::progress_percent>("progress", 13, "%", "of the job, 0 to 100"),
-    status_row<&PlcStatus::fault_detail>("fault_detail", 14, "", "belongs to the fault code"),
-    status_row<&PlcStatus::job_number>("job_number", 16, "", "of the active or last job; 0 = none"),
+    status_row<&PlcStatus::fault_detail>("fault_detail", 14, "", "phase of the job in which the fault came"),
+    status_row<&PlcStatus::job_number>("job_number", 16, "",
+                                       "of the active or last job; 0 = none, -1 = one without a number"),
     status_row<&PlcStatus::x_um>("x", 18, "um", "found position of the part, robot base"),
     status_row<&PlcStatus::y_um>("y", 20, "um", "found position of the part, robot base"),
     status_row<&PlcStatus::theta_mdeg>("theta", 22, "0.001 deg", "found rotation of the part about z"),
@@ -104,6 +106,12 @@ constexpr std::array kStatusRows{
         "worst_weld_margin", 24, "mm", "tolerance minus error bound of the worst weld; negative = refused"),
     status_row<&PlcStatus::seams_done>("seams_done", 26, "", "seams welded of this job"),
     constant_row<PlcType::Word, kPlcMapVersion>("map_version", 27, "version of this map"),
+    status_row<&PlcStatus::fault_severity>("fault_severity", 28, "",
+                                           "of fault_code: 0 none, 1 message, 2 warning, 3 fault"),
+    status_row<&PlcStatus::jobs_waiting>("jobs_waiting", 29, "",
+                                         "jobs that wait in the spool, those on hold left out"),
+    status_row<&PlcStatus::selected_job>("selected_job", 30, "",
+                                         "number chosen by Select and not yet come; 0 = none"),
 };
 
 constexpr std::uint16_t words_of(PlcType type) { return type == PlcType::Word ? 1 : 2; }

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "weldcell/wire/plc_map.hpp"
 
 namespace weldcell::wire {
@@ -15,19 +17,40 @@ constexpr Number kCommands[] = {
     {static_cast<unsigned>(PlcCommand::None), "None", "does nothing"},
     {static_cast<unsigned>(PlcCommand::Reset), "Reset", "from Stopped or Complete to Idle"},
     {static_cast<unsigned>(PlcCommand::Start), "Start", "begin the job named by job_number"},
-    {static_cast<unsigned>(PlcCommand::Stop), "Stop", "ramp to rest and end the job as interrupted"},
-    {static_cast<unsigned>(PlcCommand::Abort), "Abort", "ramp to rest and fault; needs Clear"},
-    {static_cast<unsigned>(PlcCommand::Clear), "Clear", "acknowledge a fault: from Aborted to Stopped"},
+    {static_cast<unsigned>(PlcCommand::Stop), "Stop", "ramp to rest: state Stopped, the job can be resumed"},
+    {static_cast<unsigned>(PlcCommand::Hold), "Hold", "in Execute: ramp to rest, state Held"},
+    {static_cast<unsigned>(PlcCommand::Unhold), "Unhold", "in Held, armed again: go on at the named step"},
+    {static_cast<unsigned>(PlcCommand::Suspend), "Suspend",
+     "always refused: nothing upstream or downstream holds the cell"},
+    {static_cast<unsigned>(PlcCommand::Unsuspend), "Unsuspend", "always refused"},
+    {static_cast<unsigned>(PlcCommand::Abort), "Abort",
+     "ramp to rest and end the job as failed: state Stopped"},
+    {static_cast<unsigned>(PlcCommand::Clear), "Clear",
+     "acknowledge a fault: from Aborted to Stopped; nothing moves by it"},
     {static_cast<unsigned>(PlcCommand::Arm), "Arm",
-     "a person allows motion; needed at every start and after every fault"},
+     "a person allows motion; needed at every start and after every fault, which it acknowledges too"},
     {static_cast<unsigned>(PlcCommand::Confirm), "Confirm", "the worker has placed what the projector shows"},
     {static_cast<unsigned>(PlcCommand::Resume), "Resume", "go on with an interrupted job at its named step"},
+    {static_cast<unsigned>(PlcCommand::Select), "Select",
+     "the job of job_number comes next, also in place of one that stands ready; 0 takes the choice back"},
 };
 
 constexpr Number kResults[] = {
-    {0, "done", "the command was taken"},
-    {1, "refused", "not in this state"},
-    {2, "unknown", "no such command"},
+    {static_cast<unsigned>(PlcResult::Done), "done", "the command was taken"},
+    {static_cast<unsigned>(PlcResult::Refused), "refused", "not in this state"},
+    {static_cast<unsigned>(PlcResult::Unknown), "unknown", "no such command"},
+    {static_cast<unsigned>(PlcResult::NotArmed), "not armed", "a person must arm first"},
+    {static_cast<unsigned>(PlcResult::LinkMissing), "link missing",
+     "robot controller, laser or the PLC's own heartbeat"},
+    {static_cast<unsigned>(PlcResult::OtherJob), "other job",
+     "Start names another job than the one that stands ready"},
+};
+
+constexpr Number kModes[] = {
+    {static_cast<unsigned>(PackMode::Invalid), "Invalid", "never sent"},
+    {static_cast<unsigned>(PackMode::Production), "Production", "the only mode in which the cell runs jobs"},
+    {static_cast<unsigned>(PackMode::Maintenance), "Maintenance", "not used by this version"},
+    {static_cast<unsigned>(PackMode::Manual), "Manual", "not used by this version"},
 };
 
 constexpr const char* kStates[] = {"Undefined", "Clearing",   "Stopped",   "Starting",   "Idle",
@@ -75,7 +98,19 @@ void add_numbers(std::string& out, std::string_view heading, std::span<const Num
   for (const Number& n : numbers) out += fmt::format("| {} | {} | {} |\n", n.value, n.name, n.meaning);
 }
 
+void add_alarms(std::string& out) {
+  out += "\n### Alarm list\n\n| number | text | severity | cause | action |\n|---|---|---|---|---|\n";
+  constexpr const char* kSeverities[] = {"none", "message", "warning", "fault"};
+  for (const PlcAlarm& a : plc_alarms())
+    out += fmt::format("| {} | {} | {} {} | {} | {} |\n", a.number, a.text, static_cast<unsigned>(a.severity),
+                       kSeverities[static_cast<std::size_t>(a.severity)], a.cause, a.action);
+}
+
 }  // namespace
+
+bool is_plc_command(std::uint16_t number) {
+  return std::ranges::any_of(kCommands, [&](const Number& n) { return n.value == number; });
+}
 
 std::string plc_map_markdown() {
   std::string out = fmt::format("### The PLC writes: holding registers {} to {} ({} to {}), one FC16\n\n",
@@ -90,6 +125,8 @@ std::string plc_map_markdown() {
   add_numbers(out, "Command results", kResults);
   out += "\n### PackML states (ISA-TR88)\n\n| number | state |\n|---|---|\n";
   for (std::size_t i = 0; i < std::size(kStates); ++i) out += fmt::format("| {} | {} |\n", i, kStates[i]);
+  add_numbers(out, "PackML modes (ISA-TR88)", kModes);
+  add_alarms(out);
   return out;
 }
 

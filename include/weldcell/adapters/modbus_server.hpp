@@ -28,6 +28,7 @@ struct ModbusOptions {
   Nanoseconds idle_before_eviction =
       10 * kSecond;     ///< with every place taken, a new client may push out one so long silent
   int max_clients = 8;  ///< one more is closed at once, unless one is idle
+  int max_requests_per_second = 1000;  ///< of one client; beyond it, its bytes wait in its own connection
   Nanoseconds half_frame_timeout =
       2 * kSecond;  ///< a frame begun and not ended for so long closes its connection
 };
@@ -37,6 +38,7 @@ struct ModbusCounters {
   std::uint64_t exceptions = 0;
   std::uint64_t malformed = 0;        ///< connections closed for a frame that is not Modbus
   std::uint64_t refused_clients = 0;  ///< over the limit or not allowed
+  std::uint64_t throttled = 0;        ///< times that a client had used up its requests
   std::uint64_t orders_lost = 0;      ///< images pushed out because nobody called take_order()
 };
 

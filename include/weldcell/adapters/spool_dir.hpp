@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -77,6 +78,9 @@ class SpoolDir {
   /// Moves active/<name> to done/ or failed/. Errors: "spool.missing", "spool.io".
   Result<SpoolJob> finish(const std::string& name, SpoolPlace done_or_failed);
 
+  /// Why incoming/ could not be looked through the last time (right lost, folder gone); nothing when it
+  /// could.
+  std::optional<Error> fault() const;
   /// Jobs in active/: right after open() these were interrupted by the end of the last process.
   std::vector<SpoolJob> active() const;
   /// Every job of the spool, place by place, by name.
@@ -91,6 +95,16 @@ class SpoolDir {
 
 /// The name that a job's folder may have: 1..100 of A-Z a-z 0-9 . _ - and no leading dot.
 bool is_job_name(std::string_view name);
+
+/// Orders about a waiting job. They lie as empty files in <root>/.orders, so they outlive the daemon and can
+/// be given while none runs.
+enum class SpoolMark : std::uint8_t { Hold, Cancel };
+/// Errors: "spool.name", "spool.permission", "spool.io". Marking twice is no error.
+Status mark_job(const std::filesystem::path& root, SpoolMark mark, const std::string& job);
+/// Takes the mark away; false when there was none.
+bool unmark_job(const std::filesystem::path& root, SpoolMark mark, const std::string& job);
+bool job_marked(const std::filesystem::path& root, SpoolMark mark, const std::string& job);
+std::vector<std::string> marked_jobs(const std::filesystem::path& root, SpoolMark mark);
 
 /// Drops a job and its files (each by path, kept under its file name) into <root>/incoming as one folder,
 /// atomically; returns the folder. The daemon need not run. Errors: "submit.file" (missing, not a file),

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "weldcell/cell/cell_setup.hpp"
 #include "weldcell/files/fault.hpp"
@@ -39,7 +40,9 @@ struct CellConfig {
   Endpoint laser{"127.0.0.1", 10240};
   std::string laser_dialect = "meas28";
   wire::Meas28Layout laser_layout;
-  Endpoint modbus{"127.0.0.1", 1502};  ///< we listen
+  Endpoint modbus{"127.0.0.1", 1502};     ///< we listen
+  std::vector<std::string> modbus_allow;  ///< IPv4 addresses that may connect; empty only on loopback
+  int modbus_max_clients = 8;
   wire::WordOrder word_order = wire::WordOrder::Abcd;
   double plc_heartbeat_timeout_s = 3.0;
   bool plc_required = true;  ///< false: operated from the command line only

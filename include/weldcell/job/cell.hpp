@@ -35,7 +35,9 @@ enum class FaultCode : std::uint16_t {
   RobotCommand = 30,
   ProgramStopped = 31,
   PlcLost = 40,
-  StoppedByPerson = 50
+  StoppedByPerson = 50,
+  Held = 51,
+  StateNotSaved = 60
 };
 const char* to_string(FaultCode);
 
@@ -93,14 +95,19 @@ struct RobotReply {
   int seams_done = 0;    ///< of Query: their arc is out
   int seams_begun = 0;   ///< of Query: their arc was about to start
 };
+/// A state could not be made durable. What that step would have set in motion was kept back.
+struct StorageLost {
+  std::string text;  ///< cause and mend
+};
 /// Raw data were lost before they reached the cell (a ring was full).
 struct Overrun {
   Link link = Link::Laser;
   std::uint64_t lost = 0;
 };
 
-using InputBody = std::variant<Tick, EgmCycle, LaserBytes, LinkChange, PlcInput, OperatorCommand, JobArrived,
-                               ImportDone, PlanDone, PassPlanned, SolveDone, RobotReply, Overrun>;
+using InputBody =
+    std::variant<Tick, EgmCycle, LaserBytes, LinkChange, PlcInput, OperatorCommand, JobArrived, ImportDone,
+                 PlanDone, PassPlanned, SolveDone, RobotReply, Overrun, StorageLost>;
 struct Input {
   HostTime time;
   InputBody body;
@@ -141,6 +148,12 @@ struct SaveState {
   bool guidance_done = false;
   bool weld_begun = false;
 };
+/// The job was not begun and gives way to another: it waits in the spool again.
+struct ReturnJob {};
+/// The PLC's choice: only the job of this number may come next; 0 = any.
+struct SelectJob {
+  std::int32_t number = 0;
+};
 struct FinishJob {
   bool accepted = false;
   std::string verdict;  ///< weld | rescan | reject | failed | aborted
@@ -151,8 +164,9 @@ struct LogEvent {
   std::string text;
 };
 
-using Output = std::variant<RobotRequest, ImportRequest, PlanRequest, PassRequest, SolveRequest, StartMotion,
-                            StopMotion, SetArmed, ShowDrawing, SaveState, FinishJob, LogEvent>;
+using Output =
+    std::variant<RobotRequest, ImportRequest, PlanRequest, PassRequest, SolveRequest, StartMotion, StopMotion,
+                 SetArmed, ShowDrawing, SaveState, ReturnJob, SelectJob, FinishJob, LogEvent>;
 using Outputs = std::vector<Output>;
 
 /// What can be asked of the cell at any time.
@@ -178,6 +192,7 @@ struct CellMemory {
   std::uint64_t next_request = 1;
   std::uint16_t last_sequence = 0;
   bool sequence_known = false;
+  std::int32_t selected_job = 0;
 };
 
 /// Timeouts in which the world must answer. Virtual or real seconds.
@@ -205,7 +220,7 @@ class Cell {
   void recall(const CellMemory& memory);
   /// True while laser bytes are wanted; else the caller may keep them to itself.
   bool wants_laser() const;
-  /// Fits a new job: nothing under way.
+  /// Fits a new job: nothing under way, and no PLC that has yet to reset the last one.
   bool takes_jobs() const;
 
   const std::optional<JobInput>& job() const { return job_; }
@@ -227,6 +242,7 @@ class Cell {
   void on(const SolveDone& done);
   void on(const RobotReply& reply);
   void on(const Overrun& overrun);
+  void on(const StorageLost& lost);
 
   /// Takes the first row whose guard holds; false when there is none.
   bool fire(Event event);
@@ -234,10 +250,18 @@ class Cell {
   void act(Action action);
   void fault(FaultCode code, const std::string& text);
   void finish_with(bool accepted, const std::string& verdict, const std::string& reason);
-  /// 0 done, 1 refused in this state, 2 unknown: the PLC's command_result.
-  int command(wire::PlcCommand command, const std::string& who);
-  /// Why the command cannot be obeyed now; empty when it was.
-  std::string obey(wire::PlcCommand command, const std::string& who);
+  /// Why a command was not obeyed, for the PLC and in words.
+  struct Answer {
+    wire::PlcResult result = wire::PlcResult::Done;
+    std::string hindrance;
+  };
+  wire::PlcResult command(wire::PlcCommand command, std::int32_t job_number, const std::string& who);
+  Answer obey(wire::PlcCommand command, std::int32_t job_number, const std::string& who);
+  Answer start_or_resume(wire::PlcCommand command, std::int32_t job_number);
+  Answer select(std::int32_t job_number);
+  void select_job(std::int32_t job_number);
+  /// The number that the PLC sees: -1 for a job without one.
+  static std::int32_t shown_number(const JobOrder& order);
   void set_armed(bool armed);
   void request(RobotTask task);
   void begin_scan();
@@ -247,7 +271,7 @@ class Cell {
   void settle_seams(const RobotReply& reply);
   void log(LogEvent::Level level, const std::string& text);
   void refresh_plc();
-  std::string start_hindrance() const;
+  Answer start_hindrance() const;
   const std::shared_ptr<const plan::MotionPlan>& scan_plan() const;
 
   cell::CellSetup setup_;
@@ -282,6 +306,8 @@ class Cell {
   bool egm_seen_ = false, motion_started_ = false, motion_finished_ = false;
   std::uint16_t last_sequence_ = 0;
   bool sequence_known_ = false;
+  std::int32_t selected_job_ = 0;  ///< by the PLC; 0 = the spool's order
+  bool cleared_ = false;           ///< a person has acknowledged the fault or the interruption
 };
 
 }  // namespace weldcell::job

@@ -32,7 +32,8 @@ struct JobOrder {
   Acceptance acceptance;
   CadImport cad;
   bool execute_weld = true;
-  int number = 0;  ///< PLC job number, 0 = none
+  int number = 0;    ///< PLC job number, 0 = none
+  int priority = 5;  ///< 0 to 9; of waiting jobs the highest comes first, then the oldest
 };
 
 }  // namespace weldcell::job

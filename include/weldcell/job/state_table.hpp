@@ -46,7 +46,8 @@ enum class Event : std::uint8_t {
   ProgramEnded,
   Abort,
   Reset,
-  Resume
+  Resume,
+  PutBack
 };
 
 enum class Guard : std::uint8_t {
@@ -80,7 +81,8 @@ enum class Action : std::uint8_t {
   Weld,
   Finish,
   Recover,
-  Clear
+  Clear,
+  PutBack
 };
 
 struct Row {
@@ -105,6 +107,7 @@ inline constexpr std::array kRows{
     Row{State::Ready, Event::Start, Guard::Guided, State::GuideMoving, Action::MoveToGuide},
     Row{State::Ready, Event::Start, Guard::Unguided, State::PreparingScan, Action::BeginScan},
     Row{State::Ready, Event::Abort, Guard::Always, State::Failed, Action::Finish},
+    Row{State::Ready, Event::PutBack, Guard::Always, State::Idle, Action::PutBack},
     Row{State::GuideMoving, Event::RobotDone, Guard::Always, State::Placing, Action::ShowStep},
     Row{State::GuideMoving, Event::Abort, Guard::Always, State::Failed, Action::Finish},
     Row{State::Placing, Event::Confirm, Guard::MoreSteps, State::GuideMoving, Action::MoveToGuide},
@@ -142,6 +145,8 @@ constexpr bool under_way(State s) {
   return s != State::Idle && s != State::Done && s != State::Failed && s != State::Faulted &&
          s != State::Interrupted;
 }
+
+constexpr bool ended(State s) { return s == State::Done || s == State::Failed; }
 
 const char* to_string(State);
 const char* to_string(Event);

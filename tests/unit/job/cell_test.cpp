@@ -242,5 +242,66 @@ TEST(Cell, ALateAnswerOfAnEarlierRequestMovesNothing) {
   EXPECT_EQ(d.state(), State::Faulted);
 }
 
+TEST(Cell, EveryFaultNumberStandsInTheAlarmList) {
+  for (const FaultCode code :
+       {FaultCode::EgmLost, FaultCode::EgmNotStarted, FaultCode::MotionRefused, FaultCode::RobotStopped,
+        FaultCode::LaserLost, FaultCode::LaserOverrun, FaultCode::RobotCommand, FaultCode::ProgramStopped,
+        FaultCode::PlcLost, FaultCode::StoppedByPerson, FaultCode::Held, FaultCode::StateNotSaved}) {
+    EXPECT_STRNE(to_string(code), "?") << static_cast<int>(code);
+  }
+}
+
+TEST(Cell, AFaultIsClearedToStoppedAndAHoldIsHeld) {
+  Driver d;
+  d.ready(true).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Start);
+  EXPECT_EQ(d.cell.status().plc.state, wire::PackState::Execute);
+  d.order(wire::PlcCommand::Hold);
+  EXPECT_EQ(d.cell.status().plc.state, wire::PackState::Held);
+  EXPECT_EQ(d.cell.status().plc.fault_code, 51);
+  EXPECT_FALSE(d.cell.status().armed);
+  d.order(wire::PlcCommand::Unhold);
+  EXPECT_EQ(d.state(), State::Faulted) << "not armed";
+  d.order(wire::PlcCommand::Arm).order(wire::PlcCommand::Unhold);
+  EXPECT_EQ(d.state(), State::Importing);
+  d.feed(StorageLost{"disk full"});
+  EXPECT_EQ(d.cell.status().plc.state, wire::PackState::Aborted);
+  EXPECT_EQ(d.cell.status().plc.fault_code, 60);
+  EXPECT_EQ(d.cell.status().plc.fault_severity, wire::PlcSeverity::Fault);
+  d.order(wire::PlcCommand::Clear);
+  EXPECT_EQ(d.cell.status().plc.state, wire::PackState::Stopped);
+  EXPECT_EQ(d.state(), State::Faulted);
+}
+
+TEST(Cell, SelectPutsAReadyJobBackUnbegun) {
+  Driver d;
+  d.ready(true).order(wire::PlcCommand::Arm);
+  PlcInput input;
+  input.order.command_sequence = 1;
+  d.feed(input);
+  input.order.command = wire::PlcCommand::Start;
+  input.order.job_number = 77;
+  ++input.order.command_sequence;
+  d.feed(input);
+  EXPECT_EQ(d.state(), State::Ready) << "another job is meant";
+  EXPECT_EQ(d.cell.status().plc.command_result, static_cast<int>(wire::PlcResult::OtherJob));
+  input.order.command = wire::PlcCommand::Select;
+  ++input.order.command_sequence;
+  d.feed(input);
+  EXPECT_EQ(d.state(), State::Idle);
+  EXPECT_FALSE(d.cell.status().armed);
+  EXPECT_EQ(d.of<ReturnJob>(d.last).size(), 1U);
+  EXPECT_EQ(d.cell.status().plc.selected_job, 77);
+  JobArrived other;
+  other.order.name = "other";
+  other.order.number = 5;
+  d.feed(other);
+  EXPECT_EQ(d.state(), State::Idle) << "it is not the one chosen";
+  EXPECT_EQ(d.of<ReturnJob>(d.last).size(), 1U);
+  other.order.number = 77;
+  d.feed(other);
+  EXPECT_EQ(d.state(), State::Importing);
+  EXPECT_EQ(d.cell.status().plc.selected_job, 0);
+}
+
 }  // namespace
 }  // namespace weldcell::job

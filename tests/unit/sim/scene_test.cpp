@@ -150,11 +150,12 @@ TEST(PlcWorker, RearmsOnlyWhenTold) {
   wire::PlcStatus cell;
   cell.state = wire::PackState::Aborted;
   std::vector<wire::PlcCommand> sent;
-  for (int i = 1; i < 40 && cell.state == wire::PackState::Aborted; ++i) {
+  for (int i = 1; i < 40 && cell.state != wire::PackState::Execute; ++i) {
     const wire::PlcOrder order = worker.step(cell, i * 0.1);
     if (order.command_sequence == cell.command_ack) continue;
     sent.push_back(order.command);
     cell.command_ack = order.command_sequence;
+    if (order.command == wire::PlcCommand::Clear) cell.state = wire::PackState::Stopped, cell.phase = 14;
     if (order.command == wire::PlcCommand::Arm) cell.armed = 1;
     if (order.command == wire::PlcCommand::Resume) cell.state = wire::PackState::Execute;
   }

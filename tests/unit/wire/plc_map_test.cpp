@@ -24,7 +24,7 @@ PlcStatus distinct_status() {
   s.command_ack = 1002;
   s.command_result = 2;
   s.state = PackState::Execute;
-  s.mode = 3;
+  s.mode = PackMode::Manual;
   s.phase = 11;
   s.armed = 1;
   s.guide_step = 4;
@@ -38,6 +38,9 @@ PlcStatus distinct_status() {
   s.theta_mdeg = -20125;
   s.worst_weld_margin_mm = -0.375F;
   s.seams_done = 7;
+  s.fault_severity = PlcSeverity::Fault;
+  s.jobs_waiting = 5;
+  s.selected_job = -99000;
   return s;
 }
 
@@ -49,7 +52,8 @@ bool same(const PlcStatus& a, const PlcStatus& b) {
          a.fault_detail == b.fault_detail && a.job_number == b.job_number &&
          a.progress_percent == b.progress_percent && a.x_um == b.x_um && a.y_um == b.y_um &&
          a.theta_mdeg == b.theta_mdeg && a.worst_weld_margin_mm == b.worst_weld_margin_mm &&
-         a.seams_done == b.seams_done;
+         a.seams_done == b.seams_done && a.fault_severity == b.fault_severity &&
+         a.jobs_waiting == b.jobs_waiting && a.selected_job == b.selected_job;
 }
 
 TEST(PlcMap, ConstantsStandWhereTheTableSays) {
