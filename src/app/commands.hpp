@@ -22,5 +22,9 @@ int command_status(Arguments arguments);
 int command_jobs(Arguments arguments);
 int command_show(Arguments arguments);
 int command_operate(Arguments arguments);
+int command_hold(Arguments arguments);
+int command_release(Arguments arguments);
+int command_cancel(Arguments arguments);
+int command_plc_check(Arguments arguments);
 
 }  // namespace weldcell::app

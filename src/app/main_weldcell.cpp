@@ -30,7 +30,12 @@ constexpr Command kCommands[] = {
     {"status", weldcell::app::command_status, "what the daemon does now"},
     {"jobs", weldcell::app::command_jobs, "the jobs in the spool"},
     {"show", weldcell::app::command_show, "one job: verdict, result, files"},
-    {"operate", weldcell::app::command_operate, "arm | start | confirm | stop | resume | reset | abort"},
+    {"hold", weldcell::app::command_hold, "a waiting job stays in the spool until it is released"},
+    {"release", weldcell::app::command_release, "takes the hold away"},
+    {"cancel", weldcell::app::command_cancel, "a waiting job is rejected, one under way is aborted"},
+    {"operate", weldcell::app::command_operate,
+     "arm | start | confirm | stop | hold | unhold | resume | clear | reset | abort"},
+    {"plc-check", weldcell::app::command_plc_check, "does a Modbus server, or a PLC, keep to docs/PLC.md?"},
 };
 
 int usage(std::FILE* to) {
