@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alternatives.hpp"
 #include "weldcell/base/units.hpp"
 #include "wording.hpp"
 
@@ -20,9 +21,9 @@ constexpr double kClearly_nats = 15;
 /// Per point, on average: about two thirds of the points lie on the part.
 constexpr double kExplains_nats = 2.7;
 constexpr double kNothing_nats = -1e300;
-constexpr double kDisplaced_nats = 6.5;
-/// A single point on a hidden side counts when clutter would put one there in fewer scans than this.
-constexpr double kChance = 0.012;
+/// One of some hundred places of some members, on a part that is hardly ever wrong.
+constexpr double kDisplaced_nats = 9;
+constexpr double kDoubtful_nats = 5;
 constexpr double kMinInlierShare = 0.35;
 constexpr double kMinRate = 0.5;
 /// What a pose must be known to (two sigmas) when no weld says so more exactly.
@@ -110,46 +111,38 @@ bool explained_elsewhere(const Situation& s, Localization& result) {
   return true;
 }
 
-/// A member that the points find at another place, or whose joint stands open.
-bool member_displaced(const Situation& s, Localization& result, const std::vector<int>& unseen) {
+/// A member that points and travel find at another place, or not at all.
+bool member_elsewhere(const Situation& s, Localization& result) {
+  const std::vector<int> unseen = unseen_members(s.evidence);
+  const Alternatives alternatives(s.outline, s.crossings, s.path, s.fit, s.evidence);
   Displacement best;
-  best.gain = kDisplaced_nats;
   for (int m = 0; m < static_cast<int>(s.evidence.members.size()); ++m) {
-    const MemberEvidence& e = s.evidence.members[static_cast<std::size_t>(m)];
     const bool hardly_seen = std::find(unseen.begin(), unseen.end(), m) != unseen.end();
-    if (!hardly_seen && e.seen == e.expected && e.exposed == 0) continue;
-    const Displacement d =
-        find_displacement(s.outline, s.fields, s.path, s.crossings, s.fit, s.evidence, m, hardly_seen);
-    if (hardly_seen && d.explained < std::max(4.0, 0.4 * e.expected)) continue;
-    if (d.gain > best.gain) best = d;
+    const Displacement d = alternatives.displaced(m, hardly_seen);
+    if (d.gain_nats > best.gain_nats) best = d;
   }
-  if (best.member < 0) return false;
-  say(result, Verdict::Reject, "wrong_revision",
-      fmt::format(
-          "{} lies {} of its place on the drawing: another revision, or set up wrong. Check the part against "
-          "drawing {}.",
-          member_name(s, best.member), direction_on_drawing(best.shift), s.outline.name));
-  return true;
-}
-
-/// Points on sides that a joint should hide: something there is not as drawn.
-bool joint_open(const Situation& s, Localization& result) {
-  if (s.evidence.exposed < 2 && (s.evidence.exposed == 0 || s.evidence.exposed_by_chance > kChance))
-    return false;
-  int worst = 0;
-  for (int m = 1; m < static_cast<int>(s.evidence.members.size()); ++m) {
-    if (s.evidence.members[static_cast<std::size_t>(m)].exposed >
-        s.evidence.members[static_cast<std::size_t>(worst)].exposed) {
-      worst = m;
-    }
+  double without = kNothing_nats;
+  if (!unseen.empty()) without = alternatives.missing(unseen.front());
+  if (best.gain_nats >= kDoubtful_nats && best.gain_nats > without) {
+    const std::string& name = member_name(s, best.member);
+    // What little evidence may still be chance: looking again settles it.
+    const bool sure = best.gain_nats >= kDisplaced_nats;
+    say(result, sure ? Verdict::Reject : Verdict::Rescan, "wrong_revision",
+        best.own_points > 0
+            ? fmt::format(
+                  "{} {} {} of its place on the drawing: another revision, or set up wrong. Check the part "
+                  "against drawing {}.",
+                  name, sure ? "lies" : "seems to lie", direction_on_drawing(best.shift), s.outline.name)
+            : fmt::format(
+                  "The joint of {} {} open: it is shorter than drawn, or not in its place. Check the part "
+                  "against drawing {}.",
+                  name, sure ? "stands" : "seems to stand", s.outline.name));
+    return true;
   }
-  if (s.evidence.exposed_by_chance > 0.1 * s.evidence.exposed) return false;
-  // One point may still be chance: looking again settles it.
-  say(result, s.evidence.exposed == 1 ? Verdict::Rescan : Verdict::Reject, "wrong_revision",
-      fmt::format("The joint of {} stands open: it is shorter than drawn, or not in its place. Check the "
-                  "part against "
-                  "drawing {}.",
-                  member_name(s, worst), s.outline.name));
+  if (unseen.empty()) return false;
+  say(result, without >= kDisplaced_nats ? Verdict::Reject : Verdict::Rescan, "member_missing",
+      fmt::format("{} was not seen although the scan passed over its place. Put it in place and scan again.",
+                  member_name(s, unseen.front())));
   return true;
 }
 
@@ -172,18 +165,9 @@ bool member_off(const Situation& s, Localization& result) {
 }
 
 bool wrong_part(const Situation& s, Localization& result) {
-  const std::vector<int> unseen = unseen_members(s.evidence);
   if (suspicious(s, result) && explained_elsewhere(s, result)) return true;
-  if (s.evidence.has_path && member_displaced(s, result, unseen)) return true;
-  if (!unseen.empty()) {
-    const bool gone = s.evidence.members[static_cast<std::size_t>(unseen.front())].exposed > 0;
-    say(result, gone ? Verdict::Reject : Verdict::Rescan, "member_missing",
-        fmt::format(
-            "{} was not seen although the scan passed over its place. Put it in place and scan again.",
-            member_name(s, unseen.front())));
-    return true;
-  }
-  return joint_open(s, result) || member_off(s, result);
+  if (s.evidence.has_path && member_elsewhere(s, result)) return true;
+  return member_off(s, result);
 }
 
 /// The edge whose crossing would tell most about the worst known direction.

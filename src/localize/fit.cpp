@@ -22,12 +22,13 @@ constexpr double kWideInset_mm = 3;
 /// Odds that a stated prior holds, before the points speak.
 constexpr double kPriorHolds_nats = 3;
 constexpr double kFreeMember_nats = 2;
+/// So many crossings, evenly taken, tell which members are off and how far sigmas can be believed.
+constexpr std::size_t kSettlePoints = 600;
 
-Row row_of(const TemplateFields& fields, const Crossing& crossing, const Match& m, const CentredPose& pose,
+Row row_of(const TemplateFields& fields, const Crossing& crossing, const Match& m, double c, double s,
            bool inset_everywhere) {
   const FieldEdge& edge = fields.edges()[static_cast<std::size_t>(m.edge)];
   const Vec2& n = edge.outward;
-  const double c = std::cos(pose.theta_rad), s = std::sin(pose.theta_rad);
   const Vec2& d = crossing.direction;
   const double across = n.x() * (c * d.x() + s * d.y()) + n.y() * (-s * d.x() + c * d.y());
   Row row;
@@ -110,7 +111,7 @@ FitState polish(const TemplateFields& fields, const std::vector<Crossing>& cross
     for (const Crossing& crossing : crossings) {
       const Match m = match(fields, crossing, state.pose, c, s);
       if (m.edge < 0) continue;
-      const Row row = row_of(fields, crossing, m, state.pose, false);
+      const Row row = row_of(fields, crossing, m, c, s, false);
       const double miss = squared_miss(net_residual(fields, row, m, state), m);
       const double ratio = 1 + miss / (scale * scale);
       equations.add(fields.edges()[static_cast<std::size_t>(m.edge)].member, row, 1 / (ratio * ratio));
@@ -136,7 +137,7 @@ double rough_log_likelihood(const TemplateFields& fields, const std::vector<Cros
     const Match m = match(fields, crossing, state.pose, c, s);
     double good = 0;
     if (m.edge >= 0) {
-      const Row row = row_of(fields, crossing, m, state.pose, false);
+      const Row row = row_of(fields, crossing, m, c, s, false);
       const double variance = 1 + crossing.sigma_mm * crossing.sigma_mm;
       good = std::exp(-squared_miss(net_residual(fields, row, m, state), m) / (2 * variance));
     }
@@ -165,10 +166,21 @@ class Refinement {
     if (!any_speed(crossings)) priors_.latency_ms = 0;
   }
 
-  Fit run() {
+  /// Members, tolerances and scale, from a start that is right to some millimetres.
+  void settle() {
     find_members();
     choose_inset();
     free_outlying_members();
+  }
+  /// What another run over fewer crossings has settled.
+  void adopt(const Refinement& coarse) {
+    priors_ = coarse.priors_;
+    free_ = coarse.free_;
+    fit_.state = coarse.fit_.state;
+    fit_.scale = coarse.fit_.scale;
+    fit_.iterations = coarse.fit_.iterations;
+  }
+  Fit run() {
     for (int step = 0; step < 4; ++step) iterate(step);
     finish();
     return std::move(fit_);
@@ -180,7 +192,7 @@ class Refinement {
     for (std::size_t i = 0; i < crossings_.size(); ++i) {
       fit_.matches[i] = match(fields_, crossings_[i], fit_.state.pose, c, s);
       if (fit_.matches[i].edge < 0) continue;
-      rows_[i] = row_of(fields_, crossings_[i], fit_.matches[i], fit_.state.pose, priors_.inset_everywhere);
+      rows_[i] = row_of(fields_, crossings_[i], fit_.matches[i], c, s, priors_.inset_everywhere);
       fit_.residuals[i] = net_residual(fields_, rows_[i], fit_.matches[i], fit_.state);
     }
   }
@@ -266,14 +278,14 @@ class Refinement {
 
   double evidence_of(const Priors& priors) {
     NormalEquations equations(fields_.member_centroids(), priors);
+    const double c = std::cos(fit_.state.pose.theta_rad), s = std::sin(fit_.state.pose.theta_rad);
     for (std::size_t i = 0; i < crossings_.size(); ++i) {
       if (fit_.matches[i].edge < 0) continue;
       const double sigma = crossings_[i].sigma_mm * fit_.scale;
       const double miss = squared_miss(fit_.residuals[i], fit_.matches[i]) / (sigma * sigma);
       const double inlier = 1 / (1 + std::exp(std::min(0.5 * (miss - kInlierGate * kInlierGate), 50.0)));
       if (inlier < 1e-6) continue;
-      const Row row =
-          row_of(fields_, crossings_[i], fit_.matches[i], fit_.state.pose, priors.inset_everywhere);
+      const Row row = row_of(fields_, crossings_[i], fit_.matches[i], c, s, priors.inset_everywhere);
       equations.add(member_of(i), row, inlier / (sigma * sigma));
     }
     return equations.solve_over_scales(free_).log_evidence;
@@ -404,7 +416,16 @@ class Refinement {
 
 Fit refine(const TemplateFields& fields, const std::vector<Crossing>& crossings, const FitState& start,
            const Priors& priors) {
-  return Refinement(fields, crossings, start, priors).run();
+  Refinement all(fields, crossings, start, priors);
+  if (crossings.size() <= kSettlePoints) {
+    all.settle();
+  } else {
+    const std::vector<Crossing> even = sampled(crossings, kSettlePoints);
+    Refinement coarse(fields, even, start, priors);
+    coarse.settle();
+    all.adopt(coarse);
+  }
+  return all.run();
 }
 
 }  // namespace weldcell::localize

@@ -68,7 +68,6 @@ class Solver {
                   polish(fields_, medium_, candidates_.front().state.pose, 4, &iterations_), priors_);
     evidence_ = gather_evidence(fields_, path_, fit_);
     weigh_rivals();
-    add_exposed(outline_, crossings_, fit_, evidence_);
     fill(result);
     fill_points(edges, result);
     decide({outline_, fields_, options_, crossings_, path_, fit_, evidence_, rivals_}, result);
@@ -77,8 +76,8 @@ class Solver {
 
  private:
   void collect_candidates() {
-    const std::vector<Crossing> few = sampled(crossings_, kSearchPoints);
-    for (const Mode& mode : search(fields_, crossings_, box_, kModes)) {
+    const std::vector<Crossing> few = sampled(medium_, kSearchPoints);
+    for (const Mode& mode : search(fields_, few, box_, kModes)) {
       if (!candidates_.empty() && mode.score < 0.5 * best_score_) break;
       best_score_ = std::max(best_score_, mode.score);
       consider(few, mode.pose, false);

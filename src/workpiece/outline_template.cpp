@@ -69,12 +69,18 @@ std::vector<std::pair<double, double>> visible_intervals(const Segment& side, co
   return out;
 }
 
+bool apart(const Box2& a, const Box2& b, double margin_mm) {
+  return (a.min.array() > b.max.array() + margin_mm).any() ||
+         (b.min.array() > a.max.array() + margin_mm).any();
+}
+
 /// Of two members that share a piece of silhouette only the first one shows it.
-std::vector<Cover> covers_of(const Workpiece& workpiece, std::size_t member, double joint_gap_mm) {
+std::vector<Cover> covers_of(std::span<const Polygon> members, std::size_t member, double joint_gap_mm) {
   std::vector<Cover> covers;
-  for (std::size_t j = 0; j < workpiece.members.size(); ++j) {
-    if (j == member) continue;
-    Cover cover{&workpiece.members[j].outline, {joint_gap_mm, kTouch_mm}};
+  const Box2 own = bounds(members[member]);
+  for (std::size_t j = 0; j < members.size(); ++j) {
+    if (j == member || members[j].empty() || apart(own, bounds(members[j]), 2 * joint_gap_mm)) continue;
+    Cover cover{&members[j], {joint_gap_mm, kTouch_mm}};
     if (j < member) cover.offsets_mm.push_back(-kTouch_mm);
     covers.push_back(std::move(cover));
   }
@@ -89,11 +95,14 @@ double longest_side(const Polygon& polygon) {
   return longest;
 }
 
-void append_edges(const Workpiece& workpiece, std::size_t member, double joint_gap_mm,
-                  std::vector<VisibleEdge>& out) {
-  const Polygon& outline = workpiece.members[member].outline;
-  const std::vector<Cover> covers = covers_of(workpiece, member, joint_gap_mm);
-  const double long_side = longest_side(outline) / 2;
+}  // namespace
+
+std::vector<VisibleEdge> visible_edges(std::span<const Polygon> members, std::size_t member,
+                                       double joint_gap_mm) {
+  std::vector<VisibleEdge> out;
+  const Polygon& outline = members[member];
+  if (outline.empty()) return out;
+  const std::vector<Cover> covers = covers_of(members, member, joint_gap_mm);
   // A mitre's tip stays uncovered over about one joint gap; it is no edge that a laser could see.
   const double shortest = std::max(1.0, 2 * joint_gap_mm);
   for (std::size_t i = 0; i < outline.size(); ++i) {
@@ -103,15 +112,13 @@ void append_edges(const Workpiece& workpiece, std::size_t member, double joint_g
     edge.outward = {d.y(), -d.x()};
     edge.member = static_cast<int>(member);
     edge.side = static_cast<int>(i);
-    edge.round = workpiece.members[member].edge_radius_mm > 0 && side.length() >= long_side;
     for (const auto& [from, to] : visible_intervals(side, edge.outward, covers)) {
       edge.line = {side.a + from * (side.b - side.a), side.a + to * (side.b - side.a)};
       if (edge.line.length() >= shortest) out.push_back(edge);
     }
   }
+  return out;
 }
-
-}  // namespace
 
 Result<OutlineTemplate> build_template(const Workpiece& workpiece, double joint_gap_mm) {
   OutlineTemplate out;
@@ -120,7 +127,16 @@ Result<OutlineTemplate> build_template(const Workpiece& workpiece, double joint_
   for (std::size_t i = 0; i < workpiece.members.size(); ++i) {
     out.member_names.push_back(workpiece.members[i].name);
     out.members.push_back(workpiece.members[i].outline);
-    append_edges(workpiece, i, joint_gap_mm, out.edges);
+  }
+  for (std::size_t i = 0; i < workpiece.members.size(); ++i) {
+    const double long_side = longest_side(out.members[i]) / 2;
+    for (VisibleEdge& edge : visible_edges(out.members, i, joint_gap_mm)) {
+      const Polygon& outline = out.members[i];
+      const auto side = static_cast<std::size_t>(edge.side);
+      edge.round = workpiece.members[i].edge_radius_mm > 0 &&
+                   (outline[(side + 1) % outline.size()] - outline[side]).norm() >= long_side;
+      out.edges.push_back(edge);
+    }
   }
   if (out.edges.empty()) {
     return Error{"template.empty", workpiece.name, "no side of any member can be seen from above",

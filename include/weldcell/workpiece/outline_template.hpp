@@ -2,6 +2,7 @@
 // Pure.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -40,5 +41,11 @@ struct OutlineTemplate {
 /// Sides hidden in joints (closer than joint_gap_mm to another member's side, or inside another member) are
 /// no edges. Errors: "template.empty" when nothing is visible.
 Result<OutlineTemplate> build_template(const Workpiece& workpiece, double joint_gap_mm = 0.5);
+
+/// The edges of one member that show beside the others: its sides less what other outlines cover or touch
+/// within joint_gap_mm. An empty outline stands for a member that is not there. VisibleEdge::round stays
+/// false.
+std::vector<VisibleEdge> visible_edges(std::span<const Polygon> members, std::size_t member,
+                                       double joint_gap_mm = 0.5);
 
 }  // namespace weldcell::workpiece

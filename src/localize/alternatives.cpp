@@ -1,0 +1,290 @@
+#include "alternatives.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace weldcell::localize {
+
+namespace {
+
+using workpiece::VisibleEdge;
+
+/// A point this close to an edge lies on it: noise, and members that are a little off.
+constexpr double kOnEdge_mm = 1.5;
+/// A crossing is seen when a point of its sign lies this close to it.
+constexpr double kSeenAt_mm = 5;
+constexpr double kMinAcross = 0.35;
+constexpr double kEndMargin_mm = 3;
+/// A side tells nothing about a step against it, nor along it.
+constexpr double kAgainst = -0.15;
+constexpr double kRoom_mm = 10;
+/// Below this nothing is worth a closer look.
+constexpr double kHopeless_nats = 3;
+
+bool in_box(const Vec2& p, const Box2& box) {
+  return (p.array() >= box.min.array()).all() && (p.array() <= box.max.array()).all();
+}
+
+bool apart(const Box2& a, const Box2& b) {
+  return (a.min.array() > b.max.array()).any() || (b.min.array() > a.max.array()).any();
+}
+
+Box2 grown(const Box2& box, double by) { return {Vec2(box.min.array() - by), Vec2(box.max.array() + by)}; }
+
+Polygon shifted(const Polygon& polygon, const Vec2& by) {
+  Polygon out = polygon;
+  for (Vec2& p : out) p += by;
+  return out;
+}
+
+/// Normals and directions of the sides, each line once.
+std::vector<Vec2> axes_of(const Polygon& outline) {
+  std::vector<Vec2> out;
+  for (std::size_t k = 0; k < outline.size(); ++k) {
+    const Vec2 d = Segment{outline[k], outline[(k + 1) % outline.size()]}.direction();
+    for (const Vec2& axis : {d, Vec2(d.y(), -d.x())}) {
+      if (std::none_of(out.begin(), out.end(), [&](const Vec2& a) { return std::abs(a.dot(axis)) > 0.999; }))
+        out.push_back(axis);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+Alternatives::Alternatives(const workpiece::OutlineTemplate& outline, const std::vector<Crossing>& crossings,
+                           std::span<const PathPiece> path, const Fit& fit, const Evidence& evidence) {
+  for (std::size_t m = 0; m < outline.members.size(); ++m) {
+    const MemberShift& u = fit.state.members[m];
+    const Vec2 about = centroid(outline.members[m]);
+    Pose2 turn{0, 0, u.z()};
+    const Vec2 t = about - turn.rotate(about) + u.head<2>();
+    members_.push_back(transformed(outline.members[m], {t.x(), t.y(), u.z()}));
+  }
+  const double c = std::cos(fit.state.pose.theta_rad), s = std::sin(fit.state.pose.theta_rad);
+  const auto turned = [&](const Vec2& v) { return Vec2(c * v.x() + s * v.y(), -s * v.x() + c * v.y()); };
+  spots_.reserve(crossings.size());
+  pieces_.reserve(path.size());
+  double clutter = 1;
+  for (std::size_t i = 0; i < crossings.size(); ++i) {
+    const Crossing& seen = crossings[i];
+    const Vec2 late = 1e-3 * seen.speed_mm_s * fit.state.latency_ms * turned(seen.direction);
+    spots_.push_back({fit.matches[i].place + outline.centroid - late, turned(seen.inward), seen.signed_step,
+                      fit.inlier[i] < 0.3});
+    clutter += fit.inlier[i] < 0.3;
+  }
+  double length = 1;
+  for (const PathPiece& p : path) {
+    const Vec2 a = turned(Vec2(p.x0_mm, p.y0_mm) - fit.state.pose.centre) + outline.centroid;
+    const Vec2 b = turned(Vec2(p.x1_mm, p.y1_mm) - fit.state.pose.centre) + outline.centroid;
+    if (!a.allFinite() || !b.allFinite()) continue;
+    pieces_.push_back({a, b});
+    length += (b - a).norm();
+  }
+  std::sort(spots_.begin(), spots_.end(),
+            [](const Spot& a, const Spot& b) { return a.place.x() < b.place.x(); });
+  for (const MemberEvidence& m : evidence.members) unseen_.push_back(m.expected - m.seen);
+  // Density of a point along its travel: on an edge one within twice kOnEdge_mm, clutter of either sign
+  // anywhere.
+  point_nats_ = std::clamp(std::log(length / (clutter * kOnEdge_mm)), 2.0, 9.0);
+  const double missed = std::max(0, evidence.expected - evidence.seen);
+  unseen_nats_ = std::clamp(-std::log((missed + 1.0) / (evidence.expected + 2.0)), 0.3, 5.0);
+}
+
+Alternatives::Region Alternatives::around(std::size_t member) const {
+  Region out;
+  out.box = grown(bounds(members_[member]), kMost_mm + kRoom_mm);
+  std::copy_if(spots_.begin(), spots_.end(), std::back_inserter(out.spots),
+               [&](const Spot& s) { return in_box(s.place, out.box); });
+  std::copy_if(pieces_.begin(), pieces_.end(), std::back_inserter(out.pieces), [&](const Piece& p) {
+    return !apart({p.from.cwiseMin(p.to), p.from.cwiseMax(p.to)}, out.box);
+  });
+  return out;
+}
+
+int Alternatives::unseen_on(const std::vector<VisibleEdge>& edges, const Region& region) const {
+  int out = 0;
+  const auto before = [](const Spot& s, double x) { return s.place.x() < x; };
+  for (const VisibleEdge& edge : edges) {
+    const Vec2 d = edge.line.direction();
+    const double length = edge.line.length();
+    for (const Piece& piece : region.pieces) {
+      const Vec2 a = piece.from - edge.line.a, b = piece.to - edge.line.a;
+      const double from = a.dot(edge.outward), to = b.dot(edge.outward);
+      if ((from < 0) == (to < 0) || std::abs(to - from) < kMinAcross * (b - a).norm()) continue;
+      const Vec2 at = a + from / (from - to) * (b - a);
+      const double along = at.dot(d);
+      if (along < kEndMargin_mm || along > length - kEndMargin_mm) continue;
+      const Vec2 place = edge.line.a + at;
+      if (!in_box(place, region.box)) continue;
+      bool seen = false;
+      auto s = std::lower_bound(region.spots.begin(), region.spots.end(), place.x() - kSeenAt_mm, before);
+      for (; s != region.spots.end() && s->place.x() <= place.x() + kSeenAt_mm && !seen; ++s) {
+        seen = (s->place - place).squaredNorm() < kSeenAt_mm * kSeenAt_mm &&
+               (!s->directed || s->inward.dot(edge.outward) < kAgainst);
+      }
+      out += !seen;
+    }
+  }
+  return out;
+}
+
+double Alternatives::score(const std::vector<Polygon>& members, const Region& region) const {
+  std::vector<VisibleEdge> edges;
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    if (members[m].empty() || apart(bounds(members[m]), region.box)) continue;
+    for (const VisibleEdge& edge : workpiece::visible_edges(members, m)) edges.push_back(edge);
+  }
+  struct Line {
+    Vec2 a, d, n;
+    double length;
+  };
+  std::vector<Line> lines;
+  for (const VisibleEdge& e : edges)
+    lines.push_back({e.line.a, e.line.direction(), e.outward, e.line.length()});
+  const auto explained = std::count_if(region.spots.begin(), region.spots.end(), [&](const Spot& s) {
+    return std::any_of(lines.begin(), lines.end(), [&](const Line& e) {
+      const Vec2 from = s.place - e.a;
+      if (std::abs(from.dot(e.n)) > kOnEdge_mm) return false;
+      if (s.directed && s.inward.dot(e.n) >= kAgainst) return false;
+      const double along = from.dot(e.d);
+      return along >= -kOnEdge_mm && along <= e.length + kOnEdge_mm;
+    });
+  });
+  return point_nats_ * static_cast<double>(explained) - unseen_nats_ * unseen_on(edges, region);
+}
+
+double Alternatives::missing(int member) const {
+  const auto m = static_cast<std::size_t>(member);
+  const Region region = around(m);
+  std::vector<Polygon> members = members_;
+  const double drawn = score(members, region);
+  members[m].clear();
+  return score(members, region) - drawn;
+}
+
+std::vector<Alternatives::Vote> Alternatives::votes(std::size_t member, const Region& region,
+                                                    bool loosely) const {
+  struct Step {
+    double by_mm;
+    std::size_t axis;
+  };
+  const Polygon& outline = members_[member];
+  const Box2 box = grown(bounds(outline), kMost_mm + kOnEdge_mm);
+  const std::vector<Vec2> axes = axes_of(outline);
+  const double slack = loosely ? kMost_mm : kOnEdge_mm;
+  std::vector<Step> offsets;
+  for (const Spot& s : region.spots) {
+    if (!s.free || !in_box(s.place, box)) continue;
+    for (std::size_t k = 0; k < outline.size(); ++k) {
+      const Segment side{outline[k], outline[(k + 1) % outline.size()]};
+      const Vec2 d = side.direction(), n(d.y(), -d.x());
+      if (s.directed && s.inward.dot(n) >= kAgainst) continue;
+      for (std::size_t e = 0; e < axes.size(); ++e) {
+        if (std::abs(axes[e].dot(n)) < kMinAcross) continue;
+        const double by = (s.place - side.a).dot(n) / axes[e].dot(n);
+        const double along = (s.place - side.a - by * axes[e]).dot(d);
+        if (std::abs(by) > kMost_mm || along < -slack || along > side.length() + slack) continue;
+        offsets.push_back({by, e});
+      }
+    }
+  }
+  std::vector<Vote> out;
+  for (const Step& o : offsets) {
+    if (std::abs(o.by_mm) < kLeast_mm) continue;
+    Vote vote{axes[o.axis], 0, 0};
+    for (const Step& other : offsets) {
+      if (other.axis != o.axis || std::abs(other.by_mm - o.by_mm) > kOnEdge_mm) continue;
+      vote.by_mm += other.by_mm;
+      ++vote.points;
+    }
+    vote.by_mm /= vote.points;
+    out.push_back(vote);
+  }
+  std::stable_sort(out.begin(), out.end(), [](const Vote& a, const Vote& b) { return a.points > b.points; });
+  std::vector<Vote> distinct;
+  for (const Vote& v : out) {
+    if (std::none_of(distinct.begin(), distinct.end(), [&](const Vote& w) {
+          return w.axis == v.axis && std::abs(w.by_mm - v.by_mm) < kOnEdge_mm;
+        })) {
+      distinct.push_back(v);
+    }
+  }
+  return distinct;
+}
+
+/// Unexplained points on sides of others that this member should cover.
+int Alternatives::bared_by(std::size_t member, const Region& region) const {
+  const Polygon& own = members_[member];
+  const Box2 box = grown(bounds(own), kOnEdge_mm);
+  int out = 0;
+  for (const Spot& s : region.spots) {
+    if (!s.free || !in_box(s.place, box)) continue;
+    bool on_hidden_side = false;
+    for (std::size_t m = 0; m < members_.size() && !on_hidden_side; ++m) {
+      const Polygon& other = members_[m];
+      if (m == member || !in_box(s.place, grown(bounds(other), kOnEdge_mm))) continue;
+      for (std::size_t k = 0; k < other.size() && !on_hidden_side; ++k) {
+        const Segment side{other[k], other[(k + 1) % other.size()]};
+        const Vec2 d = side.direction(), n(d.y(), -d.x());
+        on_hidden_side = distance(s.place, side) <= kOnEdge_mm &&
+                         (!s.directed || s.inward.dot(n) < kAgainst) &&
+                         (contains(own, s.place + kOnEdge_mm * n) || contains(own, s.place));
+      }
+    }
+    out += on_hidden_side;
+  }
+  return out;
+}
+
+Displacement Alternatives::displaced(int member, bool anywhere) const {
+  const auto m = static_cast<std::size_t>(member);
+  Displacement best;
+  best.member = member;
+  if (members_[m].empty()) return best;
+  const Box2 reach = grown(bounds(members_[m]), kMost_mm + kRoom_mm);
+  const bool idle = std::none_of(spots_.begin(), spots_.end(),
+                                 [&](const Spot& s) { return s.free && in_box(s.place, reach); });
+  if (idle && unseen_[m] == 0) return best;
+  Region region = around(m);
+  const std::vector<Vote> found = votes(m, region, anywhere);
+  const int bared = bared_by(m, region);
+  const double lost =
+      unseen_[m] > 0 ? unseen_nats_ * unseen_on(workpiece::visible_edges(members_, m), region) : 0;
+
+  struct Trial {
+    Vec2 shift;
+    int points;
+  };
+  std::vector<Trial> trials;
+  for (std::size_t i = 0; i < std::min<std::size_t>(found.size(), 6); ++i)
+    trials.push_back({found[i].by_mm * found[i].axis, found[i].points});
+  for (std::size_t i = 0; anywhere && i < std::min<std::size_t>(found.size(), 6); ++i) {
+    for (std::size_t k = 0; k < std::min<std::size_t>(found.size(), 12); ++k) {
+      if (found[i].axis == found[k].axis) continue;
+      trials.push_back({found[i].by_mm * found[i].axis + found[k].by_mm * found[k].axis,
+                        found[i].points + found[k].points});
+    }
+  }
+  for (std::size_t i = 0; bared > 0 && i < axes_of(members_[m]).size(); ++i) {
+    const Vec2 axis = axes_of(members_[m])[i];
+    for (const double by : {-48.0, -32.0, -20.0, -12.0, -6.0, 6.0, 12.0, 20.0, 32.0, 48.0})
+      trials.push_back({by * axis, 0});
+  }
+  std::vector<Polygon> members = members_;
+  bool drawn_known = false;
+  for (const Trial& trial : trials) {
+    const double most = point_nats_ * (trial.points + bared) + lost;
+    if (trial.shift.norm() < kLeast_mm || most < kHopeless_nats) continue;
+    members[m] = shifted(members_[m], trial.shift);
+    if (most - unseen_nats_ * unseen_on(workpiece::visible_edges(members, m), region) < kHopeless_nats)
+      continue;
+    if (!drawn_known) region.drawn_nats = score(members_, region), drawn_known = true;
+    const double gain = score(members, region) - region.drawn_nats;
+    if (gain > best.gain_nats) best = {member, trial.shift, trial.points, gain};
+  }
+  return best;
+}
+
+}  // namespace weldcell::localize

@@ -1,0 +1,72 @@
+// How well another drawing - one member elsewhere, or none at all - explains the scan, against the drawing as
+// it is. Pure.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "evidence.hpp"
+#include "fit.hpp"
+#include "weldcell/localize/localize.hpp"
+
+namespace weldcell::localize {
+
+/// One member away from its drawn place.
+struct Displacement {
+  int member = -1;
+  Vec2 shift = Vec2::Zero();  ///< frame Part, mm
+  int own_points = 0;         ///< otherwise unexplained points that lie on the member there
+  double gain_nats = -1e300;  ///< log-likelihood over the drawing as it is
+};
+
+/// Log-likelihood ratios from points and travel together: a point on a visible edge against clutter spread
+/// evenly over the travel, a crossing that should have been seen and was not. Every alternative is drawn anew
+/// around the member: what it covers there is hidden, what it leaves bare is an edge.
+class Alternatives {
+ public:
+  Alternatives(const workpiece::OutlineTemplate& outline, const std::vector<Crossing>& crossings,
+               std::span<const PathPiece> path, const Fit& fit, const Evidence& evidence);
+
+  /// The best displacement of the member between kLeast_mm and kMost_mm: along its sides' normals, and along
+  /// two of them at once when `anywhere`.
+  Displacement displaced(int member, bool anywhere) const;
+  /// Log-likelihood of a part without the member over the drawing as it is, nats.
+  double missing(int member) const;
+
+  static constexpr double kLeast_mm = 4, kMost_mm = 60;
+
+ private:
+  struct Spot {
+    Vec2 place, inward;                   ///< frame Part
+    bool directed = false, free = false;  ///< free: no edge of the drawing claims it
+  };
+  struct Piece {
+    Vec2 from, to;
+  };
+  struct Vote {
+    Vec2 axis;
+    double by_mm = 0;
+    int points = 0;
+  };
+  /// What lies within reach of one member.
+  struct Region {
+    Box2 box;
+    std::vector<Spot> spots;  ///< by x
+    std::vector<Piece> pieces;
+    double drawn_nats = 0;  ///< score of the drawing as it is
+  };
+
+  Region around(std::size_t member) const;
+  double score(const std::vector<Polygon>& members, const Region& region) const;
+  int unseen_on(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
+  std::vector<Vote> votes(std::size_t member, const Region& region, bool loosely) const;
+  int bared_by(std::size_t member, const Region& region) const;
+
+  std::vector<Polygon> members_;  ///< where the fit has them, frame Part
+  std::vector<Spot> spots_;       ///< by x
+  std::vector<Piece> pieces_;
+  std::vector<int> unseen_;  ///< crossings of each member that were expected and not seen
+  double point_nats_ = 6, unseen_nats_ = 3;
+};
+
+}  // namespace weldcell::localize
