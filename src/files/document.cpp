@@ -161,6 +161,17 @@ int deepest_flow(std::string_view text) {
   return deepest;
 }
 
+/// The first line whose indent holds a tab, 0 when none does.
+int first_tab_line(std::string_view text) {
+  for (int line = 1; !text.empty(); ++line) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::size_t word = std::min(text.substr(0, end).find_first_not_of(" \t"), end);
+    if (text.substr(0, word).find('\t') != std::string_view::npos) return line;
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return 0;
+}
+
 }  // namespace
 
 const Node* Node::find(std::string_view key) const {
@@ -206,6 +217,8 @@ std::variant<Node, Faults> parse_document(std::string_view text, const std::stri
   } catch (const Refused& refused) {
     return Faults{refused.fault};
   } catch (const YAML::Exception& error) {
+    if (const int line = first_tab_line(text); line > 0 && line <= error.mark.line + 1)
+      return Faults{{name, line, "", "is indented with a tab", "indent with blanks: YAML knows no tabs"}};
     return Faults{{name, error.mark.line + 1, "", "is not valid YAML: " + error.msg,
                    "mend this line or the one before it; is the file complete?"}};
   }
@@ -246,7 +259,9 @@ FileKind file_kind(const Node& document) {
   if (document.find("cell") != nullptr) return FileKind::Cell;
   if (document.find("scene") != nullptr) return FileKind::Scene;
   if (document.find("arm") != nullptr) return FileKind::Arm;
-  if (document.find("workpiece") != nullptr) return FileKind::Workpiece;
+  // With a word behind it, 'workpiece' is a job's reference and the job's own name was forgotten.
+  if (const Node* workpiece = document.find("workpiece"))
+    return workpiece->kind == Node::Kind::Scalar ? FileKind::Job : FileKind::Workpiece;
   return FileKind::Unknown;
 }
 

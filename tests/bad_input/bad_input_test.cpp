@@ -67,13 +67,20 @@ std::vector<fs::path> cases() {
   return out;
 }
 
+/// Wherever this checkout lies, the expected text is the same.
+std::string without(std::string text, const std::string& folder) {
+  for (std::size_t at = text.find(folder); at != std::string::npos; at = text.find(folder))
+    text.erase(at, folder.size());
+  return text;
+}
+
 TEST(BadInput, IsRefusedWithTheTextThatMendsIt) {
   fs::current_path(BAD_INPUT_CASES);
   const bool update = std::getenv("WELDCELL_UPDATE_EXPECTED") != nullptr;
   int refused = 0;
   for (const fs::path& file : cases()) {
     SCOPED_TRACE(file.string());
-    const std::string said = refusal(file);
+    const std::string said = without(refusal(file), fs::current_path().string() + "/");
     if (file.string().rfind("sound-", 0) == 0) {
       EXPECT_EQ(said, "");
       continue;
@@ -86,7 +93,7 @@ TEST(BadInput, IsRefusedWithTheTextThatMendsIt) {
     EXPECT_EQ(said, slurp(expected));
     ++refused;
   }
-  EXPECT_GE(refused, 40);
+  EXPECT_GE(refused, 68);
 }
 
 TEST(BadInput, OversizeIsRefused) {

@@ -60,7 +60,8 @@ def plc_check_finds_what_is_wrong(bin_dir):
     for mode, (meant, failed) in found.items():
         if mode != "none":
             check(meant in failed, f"{mode}: {meant} is not among {failed}")
-            check(len(failed) <= 3, f"{mode}: blames too much: {failed}")
+            # A server that serves one client fails every rule that needs a second connection.
+            check(mode == "one_client" or len(failed) <= 3, f"{mode}: blames too much: {failed}")
     print(f"{len(wrong_plc_server.MODES)} misbehaviours, each named by its own rule")
 
 
