@@ -133,7 +133,7 @@ void CellThread::dispatch(const job::Output& output) {
   } else if (const auto* request = std::get_if<job::RobotRequest>(&output)) {
     wiring_.robot_requests.push(*request);
   } else if (const auto* motion = std::get_if<job::StartMotion>(&output)) {
-    plans_.push_back(motion->plan);  // alive until the job's end, whatever the egm thread still does with it
+    plans_.push_back(motion->plan);  // alive until the next job and as long as the egm thread uses it
     wiring_.offered_plan.store(motion->plan.get(), std::memory_order_release);
   } else if (std::holds_alternative<job::StopMotion>(output)) {
     wiring_.session.request_stop();
@@ -171,7 +171,10 @@ void CellThread::order_import() {
 void CellThread::begin_job(const std::shared_ptr<const ActiveJob>& job) {
   close_record();
   active_ = job;
-  plans_.clear();
+  // The session may still ramp down along a plan of the job before; the last one may be on its way to it.
+  std::erase_if(plans_, [this](const auto& plan) {
+    return plan != plans_.back() && !wiring_.session.uses(plan.get());
+  });
   story_ = std::make_shared<JobStory>();
   accepted_at_ = adapters::utc_text(adapters::unix_ms());
   auto file = adapters::JournalFile::create(record_path(job->folder));

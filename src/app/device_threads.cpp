@@ -31,7 +31,16 @@ void report_link(Wiring& wiring, job::Link link, bool up, const std::string& det
 
 void run_egm(Wiring& wiring, adapters::EgmSocket& socket) {
   EgmItem item;
-  while (!stopping(wiring)) {
+  HostTime silent_at{-1};
+  for (;;) {
+    if (stopping(wiring)) {
+      // The controller goes on with the last speed it was told: zero must be the last.
+      if (silent_at.ns < 0) {
+        wiring.session.request_stop();
+        silent_at = adapters::now() + kSecond;
+      }
+      if (wiring.session.at_rest() || adapters::now() >= silent_at) break;
+    }
     const adapters::EgmArrival got = socket.receive_newest(item.datagram, kPoll);
     wiring.beat(ThreadName::Egm);
     if (!got) continue;

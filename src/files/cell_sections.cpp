@@ -70,6 +70,7 @@ void read_limits(Map& map, cell::MotionLimits& limits) {
   map.number("joint_speed_fraction", limits.joint_speed_fraction, {0.01, 1});
   map.joints_degrees("joint_acceleration_deg_s2", limits.joint_acceleration, {1, 20'000}, Need::Required);
   map.joints_degrees("joint_jerk_deg_s3", limits.joint_jerk, {10, 1'000'000}, Need::Required);
+  map.number("natural_frequency_hz", limits.natural_frequency_hz, {0, 100});
   map.number("line_acceleration_mm_s2", limits.line_acceleration_mm_s2, {10, 50'000});
   map.number("line_jerk_mm_s3", limits.line_jerk_mm_s3, {100, 5'000'000});
   map.degrees("margin_deg", limits.limit_margin_rad, {0, 20});
@@ -83,6 +84,7 @@ void read_egm(Map& map, CellConfig& config) {
   map.number("cycle_ms", config.setup.egm.cycle_ms, {1, 100});
   map.number("comm_timeout_s", config.setup.egm.comm_timeout_s, {0.02, 10});
   map.number("max_speed_deviation_deg_s", config.setup.egm.max_speed_deviation_deg_s, {0.1, 1000});
+  map.number("low_pass_hz", config.setup.egm.low_pass_hz, {1, 100});
   map.finish();
 }
 

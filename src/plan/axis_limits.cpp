@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace weldcell::plan {
 
 Result<AxisLimits> axis_limits(const cell::CellSetup& cell) {
@@ -10,6 +12,9 @@ Result<AxisLimits> axis_limits(const cell::CellSetup& cell) {
     out.speed[i] = cell.arm.max_speed[i] * cell.limits.joint_speed_fraction;
     out.acceleration[i] = cell.limits.joint_acceleration[i];
     out.jerk[i] = cell.limits.joint_jerk[i];
+    // A change of acceleration that lasts a whole period of the arm's lowest oscillation does not excite it.
+    if (cell.limits.natural_frequency_hz > 0)
+      out.jerk[i] = std::min(out.jerk[i], out.acceleration[i] * cell.limits.natural_frequency_hz);
     if (!(out.speed[i] > 0 && out.acceleration[i] > 0 && out.jerk[i] > 0)) {
       return Error{"plan.limits", cell.name,
                    fmt::format("J{} has no speed, acceleration or jerk to plan with", i + 1),

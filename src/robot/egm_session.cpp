@@ -22,7 +22,16 @@ constexpr double kFarBehindDeg = 0.5;
 /// Frames this much older than the last one are late; what lies farther back is a controller that began anew.
 constexpr std::int32_t kLateFrames = 250, kLateMs = 1000;
 /// Room between the limits that plans keep and the ones enforced here, for interpolation and the fade-in.
-constexpr double kSpeedSlack = 1.02, kAccelerationSlack = 1.1;
+constexpr double kSpeedSlack = 1.02, kAccelerationSlack = 1.1, kJerkSlack = 1.25;
+/// In which a reference behind its plan closes up by a factor e: gentle against the jerk limit.
+constexpr double kCloseUpS = 0.1;
+/// A stop may change its acceleration this much faster than a plan: better the arm shakes than that it goes
+/// on.
+constexpr double kStopJerk = 4;
+constexpr double kAnyJerk = 1e6;
+constexpr double kOnTargetDeg = 1e-6;
+/// An axis slower than this does not decide how fast the others may stop.
+constexpr double kSlowAxisDegS = 0.02;
 
 bool is_running(const wire::EgmFeedback& f) {
   // RAPID reports UNDEFINED for ever after some controller restarts, although it runs.
@@ -87,12 +96,18 @@ EgmSession::EgmSession(const cell::CellSetup& cell) {
     limits_.upper_deg[i] = deg(cell.arm.upper[i] - cell.limits.limit_margin_rad);
     limits_.speed_deg_s[i] = deg(cell.arm.max_speed[i]) * cell.limits.joint_speed_fraction;
     limits_.acceleration_deg_s2[i] = deg(cell.limits.joint_acceleration[i]);
-    WELDCELL_ASSERT(limits_.speed_deg_s[i] > 0 && limits_.acceleration_deg_s2[i] > 0);
+    limits_.jerk_deg_s3[i] = deg(cell.limits.joint_jerk[i]);
+    WELDCELL_ASSERT(limits_.speed_deg_s[i] > 0 && limits_.acceleration_deg_s2[i] > 0 &&
+                    limits_.jerk_deg_s3[i] > 0);
   }
+  // The controller holds a speed for one cycle, half a cycle late on the mean, and filters it once a cycle.
+  const double cycle_s = cell.egm.cycle_ms * 1e-3;
+  const double kept = std::exp(-2 * kPi * cell.egm.low_pass_hz * cycle_s);
+  speed_lead_s_ = cell.egm.low_pass_hz > 0 ? cycle_s / 2 + cycle_s * kept / (1 - kept) : 0;
 }
 
 void EgmSession::offer(const plan::MotionPlan* plan) noexcept {
-  offered_ = plan;
+  offered_.store(plan, std::memory_order_release);
   report_.refusal = EgmRefusal::None;
 }
 
@@ -139,7 +154,7 @@ void EgmSession::begin_session() noexcept {
   in_session_ = true;
   ++report_.session;
   reply_seqno_ = 0;
-  last_dt_s_ = 0;
+  last_dt_s_ = last_spacing_s_ = 0;
   drop_plan(EgmPhase::Waiting);
   hold_measured();
 }
@@ -155,8 +170,8 @@ void EgmSession::step(double dt_s) noexcept {
     report_.phase = EgmPhase::Holding;
   }
   const bool may_move = armed_.load(std::memory_order_acquire) && !stopped_ && dt_s <= kLongestCatchUpS;
-  if (report_.phase == EgmPhase::Following && !may_move) drop_plan(EgmPhase::Stopping);
-  const bool begun = offered_ != nullptr && take_offer();
+  if (report_.phase == EgmPhase::Following && !may_move) brake(true);
+  const bool begun = offered_.load(std::memory_order_relaxed) != nullptr && take_offer();
   // A ramp after a gap goes on as if no frame had been lost: the robot has stood at the last reference
   // meanwhile.
   const double motion_dt_s = dt_s <= kLongestCatchUpS ? dt_s : last_dt_s_;
@@ -175,19 +190,21 @@ void EgmSession::hold_measured() noexcept {
   target_deg_ = reference_deg_;
   reference_speed_deg_s_ = {};
   step_speed_deg_s_ = {};
+  step_acceleration_deg_s2_ = {};
 }
 
 void EgmSession::drop_plan(EgmPhase next) noexcept {
-  plan_ = nullptr;
+  plan_.store(nullptr, std::memory_order_release);
   report_.phase = next;
 }
 
 bool EgmSession::take_offer() noexcept {
-  const plan::MotionPlan& plan = *offered_;
-  offered_ = nullptr;
+  const plan::MotionPlan& plan = *offered_.load(std::memory_order_relaxed);
   report_.refusal = reason_to_refuse(plan, stopped_);
+  // In this order, so that uses() never misses a plan on its way from one to the other.
+  if (report_.refusal == EgmRefusal::None) plan_.store(&plan, std::memory_order_release);
+  offered_.store(nullptr, std::memory_order_release);
   if (report_.refusal != EgmRefusal::None) return false;
-  plan_ = &plan;
   report_.phase = EgmPhase::Following;
   report_.plan_id = plan.id;
   report_.plan_time_s = 0;
@@ -209,77 +226,173 @@ EgmRefusal EgmSession::reason_to_refuse(const plan::MotionPlan& plan, bool stopp
   return off <= kAtStartDeg ? EgmRefusal::None : EgmRefusal::NotAtStart;
 }
 
+EgmSession::WayPoint EgmSession::way_at(const plan::MotionPlan& plan, double time_s) const noexcept {
+  const plan::MotionSample at = plan::sample_at(plan, time_s);
+  const plan::MotionSample before = plan::sample_at(plan, time_s - plan.period_s / 2);
+  const plan::MotionSample after = plan::sample_at(plan, time_s + plan.period_s / 2);
+  const Fade faded = fade(time_s, plan.duration_s());
+  WayPoint out{in_degrees(at.q), in_degrees(at.qd), {}};
+  for (std::size_t i = 0; i < 6; ++i) {
+    out.place_deg[i] += faded.left * offset_deg_[i];
+    out.speed_deg_s[i] += faded.rate_per_s * offset_deg_[i];
+    out.bend_deg_s2[i] = deg(after.qd[i] - before.qd[i]) / plan.period_s;
+  }
+  return out;
+}
+
 void EgmSession::follow(double dt_s) noexcept {
-  const double duration_s = plan_->duration_s();
+  const plan::MotionPlan& plan = *plan_.load(std::memory_order_relaxed);
+  const double duration_s = plan.duration_s();
   report_.plan_time_s = std::min(report_.plan_time_s + dt_s, duration_s);
-  const plan::MotionSample sample = plan::sample_at(*plan_, report_.plan_time_s);
-  const Fade faded = fade(report_.plan_time_s, duration_s);
-  Axes target = in_degrees(sample.q), speed = in_degrees(sample.qd);
+  const Axes target = way_at(plan, report_.plan_time_s).place_deg;
   if (!(farthest(target, target_deg_) < std::numeric_limits<double>::infinity())) {
-    drop_plan(EgmPhase::Stopping);
+    brake(false);
     ramp_down(dt_s);
     return;
   }
-  bool reached = report_.plan_time_s >= duration_s;
-  for (std::size_t i = 0; i < 6; ++i) {
-    target[i] += faded.left * offset_deg_[i];
-    speed[i] += faded.rate_per_s * offset_deg_[i];
-    // Behind its plan after a cut, an axis closes up no faster than it can brake again.
-    const double behind = target_deg_[i] - reference_deg_[i];
-    const double closing =
-        std::min(std::abs(behind) / dt_s, std::sqrt(limits_.acceleration_deg_s2[i] * std::abs(behind)));
-    const double wanted = (target[i] - target_deg_[i]) / dt_s + std::copysign(closing, behind);
-    const double given = allowed(i, wanted, dt_s);
-    step_speed_deg_s_[i] = given;
-    reference_deg_[i] += given * dt_s;
-    if (std::abs(reference_deg_[i] - target[i]) < 1e-9) {
-      reference_deg_[i] = target[i];
-      reference_speed_deg_s_[i] =
-          std::clamp(speed[i], -limits_.speed_deg_s[i] * kSpeedSlack, limits_.speed_deg_s[i] * kSpeedSlack);
-    } else {
-      reference_speed_deg_s_[i] = given;
-      reached = false;
-    }
-  }
-  target_deg_ = target;
-  if (reached) {
-    reference_speed_deg_s_ = {};
-    step_speed_deg_s_ = {};
+  const bool there = track(target, way_at(plan, report_.plan_time_s + speed_lead_s_).speed_deg_s, dt_s);
+  if (there && report_.plan_time_s >= duration_s) {
     report_.plan_done = true;
-    drop_plan(EgmPhase::Holding);
+    come_to_rest();
   } else if (farthest(target_deg_, reference_deg_) > kFarBehindDeg) {
-    drop_plan(EgmPhase::Stopping);
+    brake(false);
   }
+}
+
+/// Begins a ramp to rest: along the plan, or straight on where the reference is not on it.
+void EgmSession::brake(bool on_path) noexcept {
+  report_.phase = EgmPhase::Stopping;
+  rate_ = 1;
+  rate_change_ = 0;
+  if (on_path) return;
+  plan_.store(nullptr, std::memory_order_release);
+  straight_deg_s_ = reference_speed_deg_s_;
 }
 
 void EgmSession::ramp_down(double dt_s) noexcept {
-  double rest_s = 0;
-  for (std::size_t i = 0; i < 6; ++i) {
-    rest_s = std::max(rest_s, std::abs(reference_speed_deg_s_[i]) / limits_.acceleration_deg_s2[i]);
+  const plan::MotionPlan* plan = plan_.load(std::memory_order_relaxed);
+  if (plan == nullptr) {
+    ramp_straight(dt_s);
+    return;
   }
+  const double mean_rate = slow_down(way_at(*plan, report_.plan_time_s), dt_s);
+  report_.plan_time_s = std::min(report_.plan_time_s + mean_rate * dt_s, plan->duration_s());
+  if (report_.plan_time_s >= plan->duration_s()) rate_ = 0;
+  // The lead foresees the ramp, too.
+  Axes speed = way_at(*plan, report_.plan_time_s + speed_lead_s_ * rate_).speed_deg_s;
+  for (double& v : speed) v *= std::max(0.0, rate_ + rate_change_ * speed_lead_s_);
+  track(way_at(*plan, report_.plan_time_s).place_deg, speed, dt_s);
+  if (farthest(target_deg_, reference_deg_) > kFarBehindDeg) {
+    brake(false);
+    return;
+  }
+  if (rate_ > 0) return;
+  for (const double v : step_speed_deg_s_) {
+    if (std::abs(v) > kSlowAxisDegS) return;
+  }
+  target_deg_ = reference_deg_;
+  come_to_rest();
+}
+
+/// All axes in step with constant deceleration: the reference is off its plan, so its own speed is all there
+/// is.
+void EgmSession::ramp_straight(double dt_s) noexcept {
+  double rest_s = 0;
+  for (std::size_t i = 0; i < 6; ++i)
+    rest_s = std::max(rest_s, std::abs(straight_deg_s_[i]) / limits_.acceleration_deg_s2[i]);
   const double scale = rest_s > dt_s ? 1 - dt_s / rest_s : 0;
   const double moving_s = std::min(dt_s, rest_s);
   for (std::size_t i = 0; i < 6; ++i) {
-    const double before = reference_speed_deg_s_[i], after = before * scale;
-    const double given = allowed(i, 0.5 * (before + after) * moving_s / dt_s, dt_s);
+    const double before = straight_deg_s_[i], after = before * scale;
+    const double given = allowed(i, 0.5 * (before + after) * moving_s / dt_s, dt_s, kAnyJerk);
     step_speed_deg_s_[i] = given;
     reference_deg_[i] += given * dt_s;
-    reference_speed_deg_s_[i] = std::abs(after) <= std::abs(given) ? after : given;
+    straight_deg_s_[i] = reference_speed_deg_s_[i] = std::abs(after) <= std::abs(given) ? after : given;
   }
   if (scale > 0) return;
-  reference_speed_deg_s_ = {};
-  step_speed_deg_s_ = {};
   target_deg_ = reference_deg_;
-  report_.phase = EgmPhase::Holding;
+  come_to_rest();
 }
 
-double EgmSession::allowed(std::size_t axis, double speed_deg_s, double dt_s) noexcept {
-  const double acceleration = limits_.acceleration_deg_s2[axis] * kAccelerationSlack;
+void EgmSession::come_to_rest() noexcept {
+  reference_speed_deg_s_ = {};
+  step_speed_deg_s_ = {};
+  step_acceleration_deg_s2_ = {};
+  drop_plan(EgmPhase::Holding);
+}
+
+double EgmSession::slow_down(const WayPoint& way, double dt_s) noexcept {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  const double before = rate_;
+  double lowest = -kNone, highest = kNone, rate_jerk = kNone;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double v = way.speed_deg_s[i], bend = way.bend_deg_s2[i];
+    const double jerk = limits_.jerk_deg_s3[i] * kStopJerk, most = limits_.acceleration_deg_s2[i];
+    // Slower time also takes from what the way itself bends.
+    if (std::abs(bend) * rate_ > 0.01 * jerk * dt_s)
+      lowest = std::max(lowest, -jerk / (2 * std::abs(bend) * rate_));
+    if (std::abs(v) < kSlowAxisDegS) continue;
+    const double own = bend * rate_ * rate_, last = std::clamp(step_acceleration_deg_s2_[i], -most, most);
+    const double a = (std::max(-most, last - jerk * dt_s) - own) / v;
+    const double b = (std::min(most, last + jerk * dt_s) - own) / v;
+    lowest = std::max(lowest, std::min(a, b));
+    highest = std::min(highest, std::max(a, b));
+    rate_jerk = std::min(rate_jerk, jerk / std::abs(v));
+  }
+  if (rate_jerk == kNone) {
+    rate_ = rate_change_ = 0;
+    return 0;
+  }
+  double change = lowest <= highest ? lowest : (lowest + highest) / 2;
+  // No more than can be taken back before time stands.
+  const double half = rate_jerk * dt_s / 2;
+  change = std::max(change, half - std::sqrt(half * half + 2 * rate_jerk * rate_));
+  rate_change_ = std::min(change, 0.0);
+  rate_ = rate_ + rate_change_ * dt_s;
+  if (rate_ < rate_jerk * dt_s * dt_s) rate_ = 0;
+  if (rate_ <= 0) rate_ = rate_change_ = 0;
+  return (before + rate_) / 2;
+}
+
+bool EgmSession::track(const Axes& target_deg, const Axes& speed_deg_s, double dt_s) noexcept {
+  bool there = true;
+  const double jerk = report_.phase == EgmPhase::Stopping ? kStopJerk * kJerkSlack : kJerkSlack;
+  const double spacing_s = 0.5 * (dt_s + (last_dt_s_ > 0 ? last_dt_s_ : dt_s));
+  for (std::size_t i = 0; i < 6; ++i) {
+    // Behind its plan after a cut, an axis closes up no faster than it can brake again.
+    const double behind = target_deg_[i] - reference_deg_[i];
+    const double closing =
+        std::min(std::abs(behind) / kCloseUpS, std::sqrt(limits_.acceleration_deg_s2[i] * std::abs(behind)));
+    const double wanted = (target_deg[i] - target_deg_[i]) / dt_s + std::copysign(closing, behind);
+    const double given = allowed(i, wanted, dt_s, jerk);
+    step_acceleration_deg_s2_[i] = (given - step_speed_deg_s_[i]) / spacing_s;
+    step_speed_deg_s_[i] = given;
+    reference_deg_[i] += given * dt_s;
+    if (std::abs(reference_deg_[i] - target_deg[i]) < kOnTargetDeg) {
+      const double fastest = limits_.speed_deg_s[i] * kSpeedSlack;
+      reference_deg_[i] = target_deg[i];
+      reference_speed_deg_s_[i] = std::clamp(speed_deg_s[i], -fastest, fastest);
+    } else {
+      reference_speed_deg_s_[i] = given;
+      there = false;
+    }
+  }
+  target_deg_ = target_deg;
+  last_spacing_s_ = spacing_s;
+  return there;
+}
+
+double EgmSession::allowed(std::size_t axis, double speed_deg_s, double dt_s, double jerk_share) noexcept {
+  const double most = limits_.acceleration_deg_s2[axis] * kAccelerationSlack;
   const double fastest = limits_.speed_deg_s[axis] * kSpeedSlack;
-  // Mean speeds of two cycles are half of both cycles apart.
-  const double change = acceleration * 0.5 * (dt_s + (last_dt_s_ > 0 ? last_dt_s_ : dt_s));
-  double out = std::clamp(speed_deg_s, -fastest, fastest);
-  out = std::clamp(out, step_speed_deg_s_[axis] - change, step_speed_deg_s_[axis] + change);
+  // Mean speeds of two cycles are half of both cycles apart, and so are their changes.
+  const double spacing_s = 0.5 * (dt_s + (last_dt_s_ > 0 ? last_dt_s_ : dt_s));
+  const double apart_s = 0.5 * (spacing_s + (last_spacing_s_ > 0 ? last_spacing_s_ : spacing_s));
+  const double bend = limits_.jerk_deg_s3[axis] * jerk_share * apart_s;
+  const double last = step_acceleration_deg_s2_[axis];
+  double change = (speed_deg_s - step_speed_deg_s_[axis]) / spacing_s;
+  change = std::clamp(std::clamp(change, last - bend, last + bend), -most, most);
+  double out = std::clamp(step_speed_deg_s_[axis] + change * spacing_s, -fastest, fastest);
   // Towards the end of the range no faster than it can brake, counting this cycle's own way.
   const auto brakeable = [&](double room_deg) {
     if (!(room_deg > 0)) return 0.0;

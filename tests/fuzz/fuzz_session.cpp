@@ -18,6 +18,7 @@ cell::CellSetup small_cell() {
     cell.arm.upper[i] = rad(170);
     cell.arm.max_speed[i] = rad(200);
     cell.limits.joint_acceleration[i] = rad(400);
+    cell.limits.joint_jerk[i] = rad(4000);
   }
   return cell;
 }

@@ -48,6 +48,7 @@ struct MotionLimits {
   double joint_speed_fraction = 0.5;        ///< of the arm's maximum, per axis
   kinematics::Joints joint_acceleration{};  ///< rad/s2
   kinematics::Joints joint_jerk{};          ///< rad/s3
+  double natural_frequency_hz = 0;  ///< of arm and head; 0: unknown, jerk phases as short as the limit
   double line_acceleration_mm_s2 = 1500;
   double line_jerk_mm_s3 = 15000;
   double limit_margin_rad = 0.0175;
@@ -58,6 +59,7 @@ struct EgmSetup {
   double cycle_ms = 4.0;
   double comm_timeout_s = 0.5;
   double max_speed_deviation_deg_s = 90;
+  double low_pass_hz = 100;  ///< of the controller's own filter, as EGMActJoint asks for it
 };
 
 struct WeldSetup {
