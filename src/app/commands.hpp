@@ -16,6 +16,7 @@ int command_trials(Arguments arguments);
 int command_replay(Arguments arguments);
 int command_review(Arguments arguments);
 int command_dump(Arguments arguments);
+int command_calibrate(Arguments arguments);
 int command_arm(Arguments arguments);
 int command_submit(Arguments arguments);
 int command_status(Arguments arguments);

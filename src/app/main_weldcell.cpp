@@ -25,6 +25,8 @@ constexpr Command kCommands[] = {
     {"replay", weldcell::app::command_replay, "run a record again and compare to the bit"},
     {"review", weldcell::app::command_review, "a record as one self-contained page"},
     {"dump", weldcell::app::command_dump, "a record's topic as CSV or JSON lines"},
+    {"calibrate", weldcell::app::command_calibrate,
+     "latency from passes to and fro: residuals, covariance, cell file"},
     {"arm", weldcell::app::command_arm, "joints <-> tool0 poses of an arm model, as CSV"},
     {"submit", weldcell::app::command_submit, "drop a job into the spool"},
     {"status", weldcell::app::command_status, "what the daemon does now"},

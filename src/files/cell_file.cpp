@@ -115,6 +115,7 @@ std::variant<CellConfig, Faults> parse_cell(std::string_view text, const std::st
   out.path = name;
   out.text = text;
   read_top(top, robots_dir, out);
+  if (faults.empty()) check_latency_conditions(std::get<Node>(document), out, name, faults);
   if (!faults.empty()) return in_order(std::move(faults));
   if (out.cad_cache_dir.empty()) out.cad_cache_dir = out.state_dir + "/cad";
   return out;

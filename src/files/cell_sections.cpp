@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 
 #include "weldcell/base/units.hpp"
 
@@ -40,7 +41,46 @@ void read_frame(Map& map, wire::Meas28Layout& layout) {
   layout = read;
 }
 
+void read_latency_conditions(Map& map, CellConfig& config) {
+  const Node* node = map.node("latency_measured");
+  if (node == nullptr) return;
+  Map inner(*node, map.file(), map.dotted("latency_measured"), map.faults());
+  if (node->kind != Node::Kind::Map) return;
+  LatencyConditions out;
+  inner.text("date", out.date, Need::Required);
+  inner.number("rate_hz", out.rate_hz, {50, 70'000}, Need::Required);
+  inner.text("dialect", out.dialect, Need::Required);
+  inner.text("filter", out.filter, Need::Required);
+  inner.text("robot", out.robot, Need::Required);
+  inner.finish();
+  config.latency_measured = out;
+}
+
 }  // namespace
+
+void check_latency_conditions(const Node& document, const CellConfig& config, const std::string& file,
+                              Faults& faults) {
+  const cell::LaserSetup& laser = config.setup.laser;
+  if (!config.latency_measured) return;
+  const LatencyConditions& then = *config.latency_measured;
+  const Node* section = document.find("laser");
+  const Node* measured = section == nullptr ? nullptr : section->find("latency_measured");
+  const auto differs = [&](const char* key, const std::string& was, const std::string& is) {
+    int line = measured == nullptr ? 0 : measured->line;
+    if (measured != nullptr) {
+      for (const Node::Key& k : measured->keys) line = k.text == key ? k.line : line;
+    }
+    faults.push_back({file, line, std::string("laser.latency_measured.") + key,
+                      fmt::format("the latency was measured at '{}', the cell runs '{}'", was, is),
+                      "measure it again (weldcell calibrate latency), or remove latency_measured and widen "
+                      "latency_sigma_ms"});
+  };
+  if (std::abs(then.rate_hz - laser.rate_hz) > 1e-6 * laser.rate_hz)
+    differs("rate_hz", fmt::format("{:g}", then.rate_hz), fmt::format("{:g}", laser.rate_hz));
+  if (then.dialect != config.laser_dialect) differs("dialect", then.dialect, config.laser_dialect);
+  if (then.filter != config.laser_filter) differs("filter", then.filter, config.laser_filter);
+  if (then.robot != config.setup.arm.name) differs("robot", then.robot, config.setup.arm.name);
+}
 
 bool read_endpoint(Map& map, const char* key, Endpoint& endpoint, bool zero_is_free) {
   std::string text;
@@ -152,6 +192,8 @@ void read_laser(Map& map, CellConfig& config) {
   map.number("rate_hz", laser.rate_hz, {50, 70'000});
   map.number("latency_ms", laser.latency_ms, {-100, 500});
   map.number("latency_sigma_ms", laser.latency_sigma_ms, {0, 100});
+  map.text("filter", config.laser_filter);
+  read_latency_conditions(map, config);
   map.number("spot_mm", laser.spot_mm, {0.001, 20});
   map.degrees("triangulation_deg", laser.triangulation_rad, {1, 80});
   map.number("noise_mm", laser.noise_mm, {0, 10});

@@ -17,6 +17,11 @@ void read_weld(Map& map, cell::WeldSetup& weld);
 void read_modbus(Map& map, CellConfig& config);
 void read_plc(Map& map, CellConfig& config);
 
+/// Faults where the calibrated latency's conditions differ from what the cell runs: it holds for nothing
+/// else.
+void check_latency_conditions(const Node& document, const CellConfig& config, const std::string& file,
+                              Faults& faults);
+
 /// "host:port" or "[v6]:port"; port 0 = a free one where `zero_is_free`.
 bool read_endpoint(Map& map, const char* key, Endpoint& endpoint, bool zero_is_free);
 

@@ -179,6 +179,35 @@ std::variant<std::vector<PathPiece>, Faults> parse_path(std::string_view csv, co
   return out;
 }
 
+std::variant<std::vector<calibrate::GaugeCrossing>, Faults> parse_gauge(std::string_view csv,
+                                                                        const std::string& name) {
+  Table table(csv, name,
+              {{"pass", false},
+               {"direction", true},
+               {"speed_mm_s", true},
+               {"x_mm", true},
+               {"sigma_mm", false},
+               {"edge", false},
+               {"along_mm", false}});
+  std::vector<calibrate::GaugeCrossing> out;
+  table.read([&](const std::vector<double>& v, int line) {
+    calibrate::GaugeCrossing c;
+    c.direction = v[1];
+    c.speed_mm_s = v[2];
+    c.across_mm = v[3];
+    c.sigma_mm = or_zero(v[4]);
+    c.edge = static_cast<int>(or_zero(v[5]));
+    c.along_mm = or_zero(v[6]);
+    if (v[1] != 1 && v[1] != -1)
+      table.fault(line, "direction", fmt::format("{:g} is no direction", v[1]), "1 or -1");
+    if (!(c.speed_mm_s > 0)) table.fault(line, "speed_mm_s", "is not above 0", "the speed of the pass, mm/s");
+    if (c.sigma_mm < 0) table.fault(line, "sigma_mm", "is negative", "0 = unknown");
+    out.push_back(c);
+  });
+  if (!table.faults.empty()) return table.faults;
+  return out;
+}
+
 std::string edges_csv(const std::vector<EdgePoint>& edges) {
   bool shadows = false;
   for (const EdgePoint& e : edges) shadows = shadows || e.shadowed;

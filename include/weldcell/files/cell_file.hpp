@@ -2,6 +2,7 @@
 // settings.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -17,6 +18,13 @@ namespace weldcell::files {
 struct Endpoint {
   std::string host = "127.0.0.1";
   int port = 0;  ///< 0: take a free one and say which
+};
+
+/// What a constant latency belongs to: it holds for nothing else.
+struct LatencyConditions {
+  double rate_hz = 0;
+  std::string dialect, filter, robot;
+  std::string date;  ///< UTC, of the calibration
 };
 
 enum class RealTime { Off, Try, Required };
@@ -40,6 +48,9 @@ struct CellConfig {
   Endpoint laser{"127.0.0.1", 10240};
   std::string laser_dialect = "meas28";
   wire::Meas28Layout laser_layout;
+  std::string laser_filter = "none";  ///< the sensor's own averaging or median; part of its latency
+  /// Under which the latency was measured; nothing when it was not.
+  std::optional<LatencyConditions> latency_measured;
   Endpoint modbus{"127.0.0.1", 1502};     ///< we listen
   std::vector<std::string> modbus_allow;  ///< IPv4 addresses that may connect; empty only on loopback
   int modbus_max_clients = 8;
