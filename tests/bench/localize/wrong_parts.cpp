@@ -1,0 +1,136 @@
+// Parts that are not the part of the drawing, or lie turned: what is accepted, and which cause is named.
+#include <random>
+
+#include "book.hpp"
+#include "weldcell/base/units.hpp"
+#include "weldments.hpp"
+
+namespace weldcell::bench {
+
+namespace {
+
+using localize::Localization;
+using localize::Verdict;
+
+struct Kind {
+  Wrong how;
+  const char* cause;  ///< nullptr: no single cause is right
+};
+constexpr Kind kKinds[] = {{Wrong::Mirrored, "mirrored"},
+                           {Wrong::Missing, "member_missing"},
+                           {Wrong::Moved, "wrong_revision"},
+                           {Wrong::Swapped, nullptr},
+                           {Wrong::Lengthened, nullptr}};
+
+struct Counts {
+  int trials = 0, accepted = 0, named = 0;
+  std::map<std::string, int> causes;
+  std::vector<std::string> wrong;  ///< what was accepted or given a wrong cause
+};
+
+void count(Counts& counts, const Localization& found, const char* cause, std::uint64_t seed,
+           const std::string& what) {
+  ++counts.trials;
+  const bool accepted = found.verdict == Verdict::Weld;
+  counts.accepted += accepted;
+  counts.named += cause != nullptr && found.cause == cause;
+  ++counts.causes[found.cause];
+  if (accepted || (cause != nullptr && found.cause != cause))
+    counts.wrong.push_back((accepted ? "accepted: " : found.cause + ": ") + what + ", seed " +
+                           std::to_string(seed));
+}
+
+/// Points of the scan that lie on what is there and farther than 5 mm from every edge of the drawing.
+int telling_points(const workpiece::OutlineTemplate& drawing, const EdgeSet& set) {
+  const Pose2 to_part = set.truth.inverse();
+  int out = 0;
+  for (std::size_t i = 0; i < set.edges.size(); ++i) {
+    if (set.edge_of_point[i] < 0) continue;
+    const Vec2 p = to_part * Vec2(set.edges[i].x_mm, set.edges[i].y_mm);
+    out += std::none_of(drawing.edges.begin(), drawing.edges.end(),
+                        [&](const workpiece::VisibleEdge& e) { return distance(p, e.line) < 5; });
+  }
+  return out;
+}
+
+void report(Book& book, const std::string& name, const Counts& counts) {
+  if (book.options.json) return;
+  for (const auto& [cause, n] : counts.causes)
+    std::fprintf(stderr, "    %s: %s %d\n", name.c_str(), cause.c_str(), n);
+  for (const std::string& line : counts.wrong)
+    std::fprintf(stderr, "    %s %s\n", name.c_str(), line.c_str());
+}
+
+/// These are their own mirror images, turned by 180 degrees at most.
+bool own_mirror(const std::string& name) {
+  return name == "rect" || name == "nearsym" || name == "aframe" || name == "fence" || name == "tubes";
+}
+
+void altered_parts(Book& book, const Kind& kind, const PartUnderTest& part, std::uint64_t seed) {
+  const std::string name = std::string(to_string(kind.how)) + " " + part.workpiece.name;
+  if (!book.wanted(name)) return;
+  if (kind.how == Wrong::Mirrored && own_mirror(part.workpiece.name)) return;
+  // Two members less one are a bar.
+  if (kind.how == Wrong::Missing && part.workpiece.members.size() < 3) return;
+  std::mt19937_64 random(seed);
+  Counts counts;
+  for (int i = 0; i < std::min(book.options.trials, 100); ++i) {
+    const auto other = altered(part.workpiece, kind.how, random());
+    if (!other) continue;
+    const auto outline = workpiece::build_template(other->part);
+    const std::uint64_t one = seed + static_cast<std::uint64_t>(i);
+    const EdgeSet set = make_set(*outline, Setting{}, one);
+    count(
+        counts, part.localizer.localize(set.edges, set.path, options_for(Setting{})), kind.cause, one,
+        other->what + ", " + std::to_string(telling_points(part.outline(), set)) + " points off the drawing");
+  }
+  if (counts.trials == 0) return;
+  report(book, name, counts);
+  const double share = 100.0 * counts.accepted / counts.trials;
+  // A bar that is longer at one end may end where no line of the scan passes.
+  const bool judged = kind.how != Wrong::Lengthened;
+  book.add(name + " accepted", share, "%", NAN, judged ? 0 : NAN, judged ? Better::Lower : Better::None);
+  if (kind.cause != nullptr)
+    book.add(name + " cause named right", 100.0 * counts.named / counts.trials, "%", NAN, 95, Better::Higher);
+}
+
+/// The right part turned by 180 degrees, where the job allows 20: never accepted unless a true symmetry
+/// makes the turn invisible.
+void turned(Book& book, const PartUnderTest& part, std::uint64_t seed) {
+  const std::string name = "turned 180 " + part.workpiece.name;
+  const workpiece::OutlineTemplate& outline = part.outline();
+  if (!book.wanted(name)) return;
+  if (!outline.symmetries.empty() && outline.symmetries.front().gap_mm == 0) return;
+  workpiece::OutlineTemplate around = outline;
+  const auto turn = [&](const Vec2& p) -> Vec2 { return 2 * outline.centroid - p; };
+  for (workpiece::VisibleEdge& e : around.edges) {
+    e.line = {turn(e.line.a), turn(e.line.b)};
+    e.outward = -e.outward;
+  }
+  for (Polygon& m : around.members) {
+    for (Vec2& p : m) p = turn(p);
+  }
+  Counts counts;
+  for (int i = 0; i < std::min(book.options.trials, 100); ++i) {
+    const std::uint64_t one = seed + static_cast<std::uint64_t>(i);
+    const EdgeSet set = make_set(around, Setting{}, one);
+    count(counts, part.localizer.localize(set.edges, set.path, options_for(Setting{})), "out_of_range", one,
+          "turned");
+  }
+  report(book, name, counts);
+  const double share = 100.0 * counts.accepted / counts.trials;
+  book.add(name + " accepted", share, "%", NAN, 0);
+  book.add(name + " cause named right", 100.0 * counts.named / counts.trials, "%", NAN, 95, Better::Higher);
+}
+
+}  // namespace
+
+void wrong_parts(Book& book) {
+  for (const Kind& kind : kKinds) {
+    book.each_part(
+        [&](const PartUnderTest& part, std::uint64_t seed) { altered_parts(book, kind, part, seed); });
+  }
+  book.each_part([&](const PartUnderTest& part, std::uint64_t seed) { turned(book, part, seed); });
+}
+
+}  // namespace weldcell::bench
