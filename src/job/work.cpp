@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "weldcell/localize/localizer.hpp"
+
 namespace weldcell::job {
 
 namespace {
@@ -52,6 +54,8 @@ edges::EdgeOptions edge_options(const cell::CellSetup& cell, const JobInput& job
 void add(Evidence& evidence, const edges::EdgeScan& scan) {
   evidence.edges.insert(evidence.edges.end(), scan.edges.begin(), scan.edges.end());
   evidence.path.insert(evidence.path.end(), scan.path.begin(), scan.path.end());
+  evidence.top_z_mm.insert(evidence.top_z_mm.end(), scan.top_z_mm.begin(), scan.top_z_mm.end());
+  evidence.table_z_mm.insert(evidence.table_z_mm.end(), scan.table_z_mm.begin(), scan.table_z_mm.end());
   edges::EdgeSummary& sum = evidence.edge_summary;
   sum.candidates += scan.summary.candidates;
   sum.accepted += scan.summary.accepted;
@@ -151,12 +155,17 @@ Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared&
   const edges::EdgeScan first = edges::detect(points, look);
   Evidence draft = out.evidence;
   add(draft, first);
-  out.found = localize::localize(prepared.outline, draft.edges, draft.path, options);
+  const localize::Localizer localizer(prepared.outline);
+  out.found = localizer.localize(draft.edges, draft.path, options);
   look.outline = outline_at(prepared.outline, out.found.pose);
   add(out.evidence, edges::detect(points, look));
-  out.found = localize::localize(prepared.outline, out.evidence.edges, out.evidence.path, options);
+  out.found = localizer.localize(out.evidence.edges, out.evidence.path, options);
+  out.heights = localize::fit_heights(out.evidence.edges, out.evidence.top_z_mm, out.evidence.table_z_mm,
+                                      out.found.centroid_base, cell.laser.noise_mm);
 
-  out.certificates = weld::certify(job.workpiece, out.found, certify_options(cell));
+  weld::CertifyOptions certify = certify_options(cell);
+  if (out.heights.top) certify.top = weld::MeasuredTop{out.heights.reference, *out.heights.top};
+  out.certificates = weld::certify(job.workpiece, out.found, certify);
   out.verdict = weld::decide(out.found, out.certificates);
   if (out.verdict.verdict != localize::Verdict::Weld) return out;
 

@@ -256,6 +256,22 @@ bool finite(const Localization& found) {
   return all;
 }
 
+/// Height of the part's upper surface at a place, Base.
+double top_at(const Workpiece& workpiece, const Vec2& place, const CertifyOptions& options) {
+  return options.top ? options.top->plane.at(place, options.top->reference)
+                     : options.table_z_mm + workpiece.height_mm;
+}
+
+/// How far the measured top lies from where table and drawing put it, at the seam's worst point.
+double height_off(const Workpiece& workpiece, const WeldCertificate& weld, const CertifyOptions& options) {
+  double worst = 0;
+  for (const Eigen::Vector3d& p : weld.path) {
+    const double off = top_at(workpiece, p.head<2>(), options) - options.table_z_mm - workpiece.height_mm;
+    if (std::abs(off) > std::abs(worst)) worst = off;
+  }
+  return worst;
+}
+
 WeldCertificate certify_one(const Workpiece& workpiece, const Weld& weld, const Localization& found,
                             const CertifyOptions& options) {
   WeldCertificate out;
@@ -274,7 +290,8 @@ WeldCertificate certify_one(const Workpiece& workpiece, const Weld& weld, const 
   for (const Eigen::Vector3d& p : workpiece::sample_path(weld, kPathStepMm)) {
     const Vec2 planned = found.pose * Vec2(p.head<2>());
     const Vec2 seam = planned + mean_displacement(joined, planned);
-    out.path.push_back({seam.x(), seam.y(), options.table_z_mm + p.z()});
+    const double below_top = workpiece.height_mm - p.z();
+    out.path.push_back({seam.x(), seam.y(), top_at(workpiece, seam, options) - below_top});
   }
   if (out.path.size() < 2) {
     out.path.clear();
@@ -283,6 +300,14 @@ WeldCertificate certify_one(const Workpiece& workpiece, const Weld& weld, const 
   }
   bound_over_path(found, joined, options, out);
   judge(found, joined, options, out);
+  if (const double off = height_off(workpiece, out, options); std::abs(off) > options.max_height_off_mm) {
+    out.verdict = Verdict::Reject;
+    out.reason = fmt::format(
+        "weld {}: the part's top lies {:.1f} mm {} where table and drawing put it: clear what lies under the "
+        "part, or "
+        "calibrate the table",
+        out.name, std::abs(off), off > 0 ? "above" : "below");
+  }
   if (gravity(found.verdict) > gravity(out.verdict)) {
     out.verdict = found.verdict;
     out.reason = fmt::format("weld {}: waits for a further scan: {}", weld.name, found.reason);

@@ -10,6 +10,7 @@
 #include "weldcell/edges/edges.hpp"
 #include "weldcell/guidance/drawing.hpp"
 #include "weldcell/job/job_order.hpp"
+#include "weldcell/localize/height.hpp"
 #include "weldcell/localize/localize.hpp"
 #include "weldcell/plan/scan_plan.hpp"
 #include "weldcell/weld/certificate.hpp"
@@ -47,15 +48,17 @@ struct ScanRecord {
 struct Evidence {
   std::vector<EdgePoint> edges;
   std::vector<PathPiece> path;
-  std::vector<align::SurfacePoint> shown;  ///< thinned surface points for the report
-  align::AlignSummary align;               ///< of the last pass
-  edges::EdgeSummary edge_summary;         ///< summed
+  std::vector<double> top_z_mm, table_z_mm;  ///< plateau heights beside each edge, Base
+  std::vector<align::SurfacePoint> shown;    ///< thinned surface points for the report
+  align::AlignSummary align;                 ///< of the last pass
+  edges::EdgeSummary edge_summary;           ///< summed
 };
 
 /// What localization and re-planning made of the evidence.
 struct Solution {
   Evidence evidence;
   localize::Localization found;
+  localize::HeightFit heights;  ///< about the found centroid
   std::vector<weld::WeldCertificate> certificates;
   weld::JobVerdict verdict;
   std::vector<weld::TorchPath> torch;  ///< empty unless the verdict is weld

@@ -1,9 +1,11 @@
 // Weld certificates: the bound of each weld's lateral error against its tolerance, after localization. Pure.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "weldcell/localize/height.hpp"
 #include "weldcell/localize/localize.hpp"
 #include "weldcell/workpiece/workpiece.hpp"
 
@@ -23,10 +25,19 @@ struct WeldCertificate {
   std::string weakest;  ///< what limits the bound: a member's name, "part" or "robot"
 };
 
+/// The part's upper surface as the scan saw it: seams follow it, also on a table that is not level or not
+/// quite at its configured height.
+struct MeasuredTop {
+  Vec2 reference = Vec2::Zero();  ///< Base, mm
+  localize::TiltedPlane plane;
+};
+
 struct CertifyOptions {
   double robot_sigma_mm = 0.05;  ///< arm's own path error, added to the bound
   double max_gap_mm = 1.0;
   double table_z_mm = 0;
+  std::optional<MeasuredTop> top;  ///< absent: the part's top lies its height above table_z_mm everywhere
+  double max_height_off_mm = 5;    ///< a measured top farther from that is not believed and nothing is welded
   double bias_mm = 0;  ///< lateral error known to be one-sided (calibration residual); added in full
   double max_member_shift_mm = 3;  ///< a member displaced by more at its weld belongs to another drawing
   double unmeasured_shift_sigma_mm = 0.5;  ///< of a joined member of which the localization says nothing

@@ -48,7 +48,8 @@ TEST(LatencyFit, RecoversLatencyAndBiasWithinItsCovariance) {
   std::printf("seed %llu\n", static_cast<unsigned long long>(kSeed));
   std::mt19937_64 random(kSeed);
   int inside = 0, trials = 0;
-  double worst = 0;
+  int within_bar = 0;
+  double square = 0;
   for (const double latency : {0.0, 0.5, 2.7, 10.0}) {
     for (int i = 0; i < 100; ++i) {
       Gauge g;
@@ -57,13 +58,17 @@ TEST(LatencyFit, RecoversLatencyAndBiasWithinItsCovariance) {
       const auto fit = fit_latency(crossings(g, random));
       ASSERT_TRUE(fit.ok()) << fit.error().text();
       const double error = fit->latency_ms - latency;
-      worst = std::max(worst, std::abs(error));
+      within_bar += std::abs(error) <= 0.1 ? 1 : 0;
+      square += error * error;
       inside += std::abs(error) <= 2 * fit->sigma_ms() ? 1 : 0;
       ++trials;
     }
   }
-  std::printf("worst %.4f ms, inside 2 sigma %d of %d\n", worst, inside, trials);
-  EXPECT_LE(worst, 0.1);
+  std::printf("rms %.4f ms, within 0.1 ms %d, inside 2 sigma %d of %d\n", std::sqrt(square / trials),
+              within_bar, inside, trials);
+  // Three sigmas of a single gauge scan reach 0.1 ms: one draw in a hundred may pass it.
+  EXPECT_GE(within_bar, trials * 99 / 100);
+  EXPECT_LE(std::sqrt(square / trials), 0.045);
   EXPECT_GE(inside, trials * 88 / 100);
 }
 

@@ -82,6 +82,27 @@ TEST(Certificate, PathFollowsThePartTheTableAndTheMeanOfTheJoinedMembers) {
     EXPECT_LE((c.path[k] - c.path[k - 1]).norm(), kPathStepMm + 1e-9);
 }
 
+TEST(Certificate, SeamsFollowTheMeasuredTopAndAnIncredibleOneWeldsNothing) {
+  const auto part = ladder();
+  const auto found = found_ladder(part, {900, 30, 0});
+  CertifyOptions options;
+  options.table_z_mm = 500;
+  MeasuredTop top;
+  top.reference = {900, 30};
+  top.plane.z_mm = options.table_z_mm + part.height_mm + 1.5;
+  top.plane.slope_x = 0.004;
+  options.top = top;
+  for (const auto& c : certify(part, found, options)) {
+    EXPECT_EQ(c.verdict, Verdict::Weld) << c.reason;
+    for (const Eigen::Vector3d& p : c.path) EXPECT_NEAR(p.z(), 541.5 + 0.004 * (p.x() - 900), 1e-9);
+  }
+  options.top->plane.z_mm += 6;
+  for (const auto& c : certify(part, found, options)) {
+    EXPECT_EQ(c.verdict, Verdict::Reject);
+    EXPECT_NE(c.reason.find("above where table and drawing put it"), std::string::npos) << c.reason;
+  }
+}
+
 TEST(Certificate, AMemberTurnedAboutItsCentreMovesTheSeamAtItsEnd) {
   const auto part = ladder();
   auto found = found_ladder(part, {0, 0, 0});
