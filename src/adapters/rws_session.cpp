@@ -6,6 +6,7 @@
 #include <Poco/Net/HTTPResponse.h>
 #include <Poco/Net/HTTPSClientSession.h>
 #include <Poco/Net/NetException.h>
+#include <Poco/Net/SSLException.h>
 #include <Poco/Net/SecureStreamSocket.h>
 #include <Poco/Net/X509Certificate.h>
 
@@ -69,20 +70,9 @@ std::unique_ptr<net::HTTPClientSession> make_rws_session(const RwsAccess& access
 Result<wire::RwsGeneration> find_rws_generation(const RwsAccess& access) {
   const std::string place = "rws " + access.host + ":" + std::to_string(access.port);
   const Poco::Timespan timeout = rws_timespan(access.timeout);
+  // Plain first: a TLS server refuses plain HTTP at once, a plain server may wait for the end of a TLS
+  // greeting.
   try {
-    const net::SocketAddress address(access.host, static_cast<Poco::UInt16>(access.port));
-    try {
-      net::SecureStreamSocket secure(tls_context());
-      secure.connect(address, timeout);
-      secure.setReceiveTimeout(timeout);
-      secure.completeHandshake();
-      secure.close();
-      return wire::RwsGeneration::Two;
-    } catch (const Poco::Net::ConnectionRefusedException&) {
-      throw;
-    } catch (const Poco::Exception&) {
-      // No TLS there: generation 1, when plain HTTP says so.
-    }
     net::HTTPClientSession plain(access.host, static_cast<Poco::UInt16>(access.port));
     plain.setTimeout(timeout, timeout, timeout);
     net::HTTPRequest request("GET", "/rw/system", net::HTTPRequest::HTTP_1_1);
@@ -92,6 +82,17 @@ Result<wire::RwsGeneration> find_rws_generation(const RwsAccess& access) {
     if (response.getStatus() == net::HTTPResponse::HTTP_UNAUTHORIZED &&
         net::HTTPCredentials::isDigestCredentials(response.get("WWW-Authenticate", "")))
       return wire::RwsGeneration::One;
+  } catch (const Poco::Exception&) {
+    // No HTTP there; whether anything is there the next question tells.
+  }
+  try {
+    net::SecureStreamSocket secure(tls_context());
+    secure.connect(net::SocketAddress(access.host, static_cast<Poco::UInt16>(access.port)), timeout);
+    secure.setReceiveTimeout(timeout);
+    secure.completeHandshake();
+    secure.close();
+    return wire::RwsGeneration::Two;
+  } catch (const net::SSLException&) {
     return Error{"http.refused", place, "what answers there asks for no digest and talks no TLS",
                  "check rws.address: RWS 1.0 is on port 80, RWS 2.0 on 443 unless the controller says else"};
   } catch (const Poco::Exception& e) {
