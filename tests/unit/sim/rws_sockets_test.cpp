@@ -276,7 +276,7 @@ TEST_P(RwsSockets, WhatCannotBeSubscribedIsRefused) {
   }
   std::string quick = "resources=1";
   for (int i = 1; i <= 65; ++i) {
-    char name[16];
+    char name[24];
     std::snprintf(name, sizeof name, "doSpare%03d", i);
     quick +=
         "&" + std::to_string(i) + "=/rw/iosystem/signals/" + name + ";state&" + std::to_string(i) + "-p=2";
