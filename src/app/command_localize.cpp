@@ -79,13 +79,16 @@ void print_words(const Job& job, const nlohmann::json& result, const Localizatio
       localize::offset_from_planned(job.localizer.outline(), job.options.planned, found.pose);
   std::printf("%s: %s\n", result["verdict"].get<std::string>().c_str(),
               result["reason"].get<std::string>().c_str());
+  if (found.iterations == 0) return;  // refused before any pose was tried
   std::printf("  pose      x %.3f mm, y %.3f mm, theta %.4f deg\n", found.pose.x_mm, found.pose.y_mm,
               deg(found.pose.theta_rad));
   std::printf("  offset    %.3f mm, %.3f mm, %.4f deg from planned\n", off.dx_mm, off.dy_mm,
               deg(off.dtheta_rad));
-  std::printf("  known to  %.3f mm, %.3f mm, %.4f deg (1 sigma)\n",
-              result["centroid_sigma_mm"][0].get<double>(), result["centroid_sigma_mm"][1].get<double>(),
-              result["theta_sigma_deg"].get<double>());
+  if (!result["covariance_mm_rad"].is_null()) {
+    std::printf("  known to  %.3f mm, %.3f mm, %.4f deg (1 sigma)\n",
+                result["centroid_sigma_mm"][0].get<double>(), result["centroid_sigma_mm"][1].get<double>(),
+                result["theta_sigma_deg"].get<double>());
+  }
   std::printf("  points    %d of %d on the part, mean error %.2f mm\n", found.inliers, found.points,
               found.mean_error_mm);
   if (found.latency_s) std::printf("  latency   %.2f ms\n", 1e3 * *found.latency_s);
@@ -114,7 +117,8 @@ int run_one(const Job& job, const std::string& edges_path, const std::string& pa
   const Localization found = job.localizer.localize(edges, path, job.options);
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
   std::vector<weld::WeldCertificate> certificates;
-  if (job.options.method == localize::Method::Robust) {
+  // Without a pose and its covariance there is nothing to certify a weld by.
+  if (!found.covariance.isZero(0)) {
     certificates = weld::certify(job.workpiece, found, weld::CertifyOptions{});
   }
   nlohmann::json result =

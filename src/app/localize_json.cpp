@@ -50,6 +50,19 @@ json welds_json(const std::vector<weld::WeldCertificate>& certificates) {
 
 double sigma(double variance) { return std::sqrt(std::max(variance, 0.0)); }
 
+/// Covariance and sigmas; null where none was estimated: a zero would claim that the place is known exactly.
+void add_uncertainty(const localize::Localization& found, json& out) {
+  for (const char* key : {"covariance_mm_rad", "centroid_sigma_mm", "theta_sigma_deg"}) out[key] = json();
+  if (found.covariance.isZero(0)) return;
+  json covariance = json::array();
+  for (int i = 0; i < 3; ++i) {
+    covariance.push_back({found.covariance(i, 0), found.covariance(i, 1), found.covariance(i, 2)});
+  }
+  out["covariance_mm_rad"] = covariance;
+  out["centroid_sigma_mm"] = {sigma(found.covariance(0, 0)), sigma(found.covariance(1, 1))};
+  out["theta_sigma_deg"] = deg(sigma(found.covariance(2, 2)));
+}
+
 }  // namespace
 
 nlohmann::json localize_json(const workpiece::OutlineTemplate& outline, const Pose2& planned,
@@ -57,11 +70,7 @@ nlohmann::json localize_json(const workpiece::OutlineTemplate& outline, const Po
                              const std::vector<weld::WeldCertificate>& certificates, double seconds) {
   const weld::JobVerdict verdict = weld::decide(found, certificates);
   const localize::Offset offset = localize::offset_from_planned(outline, planned, found.pose);
-  json covariance = json::array();
-  for (int i = 0; i < 3; ++i) {
-    covariance.push_back({found.covariance(i, 0), found.covariance(i, 1), found.covariance(i, 2)});
-  }
-  return {
+  json out = {
       {"verdict", localize::to_string(verdict.verdict)},
       {"accepted", verdict.verdict == localize::Verdict::Weld},
       {"cause", found.cause},
@@ -70,9 +79,6 @@ nlohmann::json localize_json(const workpiece::OutlineTemplate& outline, const Po
       {"y_mm", found.pose.y_mm},
       {"theta_deg", deg(found.pose.theta_rad)},
       {"offset", {{"dx_mm", offset.dx_mm}, {"dy_mm", offset.dy_mm}, {"dtheta_deg", deg(offset.dtheta_rad)}}},
-      {"covariance_mm_rad", covariance},
-      {"centroid_sigma_mm", {sigma(found.covariance(0, 0)), sigma(found.covariance(1, 1))}},
-      {"theta_sigma_deg", deg(sigma(found.covariance(2, 2)))},
       {"mean_error_mm", found.mean_error_mm},
       {"points", found.points},
       {"inliers", found.inliers},
@@ -82,6 +88,8 @@ nlohmann::json localize_json(const workpiece::OutlineTemplate& outline, const Po
       {"members", members_json(found)},
       {"welds", welds_json(certificates)},
       {"seconds", seconds}};
+  add_uncertainty(found, out);
+  return out;
 }
 
 }  // namespace weldcell::app

@@ -21,6 +21,15 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
+/// What a message may show of foreign text: at most 40 characters, none that a terminal would act upon.
+std::string shown(std::string_view text) {
+  std::string out(text.substr(0, 40));
+  for (char& c : out) {
+    if (c < ' ' || c > '~') c = '?';
+  }
+  return text.size() > 40 ? out + "..." : out;
+}
+
 struct Column {
   const char* name;
   bool required;
@@ -30,7 +39,10 @@ struct Column {
 class Table {
  public:
   Table(std::string_view csv, std::string file, std::vector<Column> columns)
-      : csv_(csv), file_(std::move(file)), columns_(std::move(columns)), place_(columns_.size(), -1) {}
+      : csv_(csv), file_(std::move(file)), columns_(std::move(columns)), place_(columns_.size(), -1) {
+    // Spreadsheets put a byte order mark before UTF-8.
+    if (csv_.starts_with("\xEF\xBB\xBF")) csv_.remove_prefix(3);
+  }
 
   /// Calls row(values, line) for each row whose numbers are sound; values stand in the order of `columns`,
   /// NaN = absent.
@@ -96,7 +108,7 @@ class Table {
         return;
       }
       const std::string near = nearest_word(std::string(name), known);
-      fault(line, std::string(name), "unknown column",
+      fault(line, shown(name), "unknown column",
             near.empty() ? "known: " + names() : "did you mean '" + near + "'?");
     });
     for (std::size_t c = 0; c < columns_.size(); ++c) {
@@ -115,10 +127,9 @@ class Table {
         if (field.size() > 1 && field.front() == '+') field.remove_prefix(1);
         const auto [rest, error] = std::from_chars(field.data(), field.data() + field.size(), values[c]);
         if (error != std::errc{} || rest != field.data() + field.size() || !std::isfinite(values[c])) {
-          fault(line, columns_[c].name, "'" + std::string(field.substr(0, 40)) + "' is not a finite number",
-                "write a number");
+          fault(line, columns_[c].name, "'" + shown(field) + "' is not a finite number", "write a number");
         } else if (std::abs(values[c]) > 1e6) {
-          fault(line, columns_[c].name, "'" + std::string(field) + "' is out of range", "-1e6 to 1e6");
+          fault(line, columns_[c].name, "'" + shown(field) + "' is out of range", "-1e6 to 1e6");
         }
       }
     });

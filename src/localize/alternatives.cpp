@@ -78,7 +78,6 @@ Alternatives::Alternatives(const workpiece::OutlineTemplate& outline, const std:
   for (const PathPiece& p : path) {
     const Vec2 a = turned(Vec2(p.x0_mm, p.y0_mm) - fit.state.pose.centre) + outline.centroid;
     const Vec2 b = turned(Vec2(p.x1_mm, p.y1_mm) - fit.state.pose.centre) + outline.centroid;
-    if (!a.allFinite() || !b.allFinite()) continue;
     pieces_.push_back({a, b});
     length += (b - a).norm();
   }

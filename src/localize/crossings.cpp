@@ -8,8 +8,6 @@ namespace weldcell::localize {
 
 namespace {
 
-constexpr double kFarthest_mm = 1e5;
-
 bool usable(const EdgePoint& e) {
   return std::isfinite(e.x_mm) && std::isfinite(e.y_mm) && std::isfinite(e.dir_x) && std::isfinite(e.dir_y) &&
          std::abs(e.x_mm) < kFarthest_mm && std::abs(e.y_mm) < kFarthest_mm;

@@ -24,10 +24,13 @@ struct Crossings {
   int broken = 0;  ///< points that were no numbers
 };
 
-/// Points that are not finite are dropped and counted; a point that stands twice counts once; sigma outside
-/// [kMinSigma_mm, kMaxSigma_mm] is brought into it, unknown or negative sigma becomes default_sigma_mm.
+/// Points that are not finite, or beyond kFarthest_mm, are dropped and counted; a point that stands twice
+/// counts once; sigma outside [kMinSigma_mm, kMaxSigma_mm] is brought into it, unknown or negative sigma
+/// becomes default_sigma_mm.
 Crossings ready_crossings(std::span<const EdgePoint> edges, double default_sigma_mm);
 
+/// A point of the scan farther than this from Base is no place in a cell, and counts as broken.
+inline constexpr double kFarthest_mm = 1e5;
 inline constexpr double kMinSigma_mm = 0.02;
 inline constexpr double kMaxSigma_mm = 3.0;
 

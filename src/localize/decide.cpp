@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 
 #include "alternatives.hpp"
 #include "weldcell/base/units.hpp"
@@ -191,14 +194,66 @@ bool too_vague(const Situation& s, Localization& result) {
   const Eigen::Matrix2d xy = result.covariance.topLeftCorner<2, 2>();
   const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(xy).eigenvalues()(1);
   const double sigma_rad = std::sqrt(result.covariance(2, 2));
+  // A covariance that rounding has left without a positive determinant proves nothing either.
+  const bool proven = result.covariance.allFinite() &&
+                      Eigen::LLT<Eigen::Matrix3d>(result.covariance).info() == Eigen::Success;
   const double bound_rad = std::max(kPoseBound_rad, 1.0 / std::max(s.outline.radius_mm, 1.0));
-  if (2 * std::sqrt(std::max(largest, 0.0)) <= kPoseBound_mm && 2.5 * sigma_rad <= bound_rad) return false;
+  if (proven && 2 * std::sqrt(std::max(largest, 0.0)) <= kPoseBound_mm && 2.5 * sigma_rad <= bound_rad)
+    return false;
   const int edge = most_telling_edge(s, s.fit.covariance.topLeftCorner<3, 3>());
   say(result, Verdict::Rescan, "not_enough",
       fmt::format("Not enough was seen to place the part (known to {} and {}). Scan across the {} again.",
                   millimetres(2 * std::sqrt(std::max(largest, 0.0))), degrees(2 * sigma_rad),
                   edge_name(s.outline, edge)));
   return true;
+}
+
+/// How many points may be there by chance, among those that tell about one direction: clutter meets an edge
+/// now and then, and the search picks the place where it does so most. The travel speaks against most such
+/// places.
+std::size_t by_chance(const Situation& s, int inliers) {
+  const std::size_t outliers = s.crossings.size() - static_cast<std::size_t>(inliers);
+  return s.evidence.has_path ? 1 + outliers / 16 : 2 + outliers / 8;
+}
+
+/// Whether some direction of the pose (shift, or turn as the shift of the farthest point) hangs on points
+/// that may be there by chance: without the most telling ones less than kMustRemain whole points tell about
+/// it.
+bool hangs_on_few(const Situation& s, Localization& result) {
+  constexpr double kMustRemain = 2;
+  const double radius = std::max(s.outline.radius_mm, 1.0);
+  std::vector<Eigen::Vector3d> rows;
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < s.fit.matches.size(); ++i) {
+    const Match& m = s.fit.matches[i];
+    if (m.edge < 0 || s.fit.inlier[i] <= 0.5) continue;
+    const Vec2& n = s.fields.edges()[static_cast<std::size_t>(m.edge)].outward;
+    rows.emplace_back(n.x(), n.y(), (n.y() * m.place.x() - n.x() * m.place.y()) / radius);
+    information += rows.back() * rows.back().transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(information);
+  const std::size_t chance = std::min(by_chance(s, result.inliers), rows.size());
+  for (int k = 0; k < 3; ++k) {
+    std::vector<double> tells;
+    tells.reserve(rows.size());
+    for (const Eigen::Vector3d& row : rows) {
+      const double along = row.dot(axes.eigenvectors().col(k));
+      tells.push_back(along * along);
+    }
+    std::nth_element(tells.begin(), tells.begin() + static_cast<std::ptrdiff_t>(chance), tells.end(),
+                     std::greater<>());
+    if (std::accumulate(tells.begin() + static_cast<std::ptrdiff_t>(chance), tells.end(), 0.0) >= kMustRemain)
+      continue;
+    const Eigen::Vector3d open = axes.eigenvectors().col(k).cwiseProduct(Eigen::Vector3d(1, 1, 1 / radius));
+    const int edge = most_telling_edge(s, open * open.transpose());
+    say(result, Verdict::Rescan, "not_enough",
+        fmt::format(
+            "Too few points tell where the part lies in one direction, so that a stray one could shift "
+            "it. Scan across the {} again.",
+            edge_name(s.outline, edge)));
+    return true;
+  }
+  return false;
 }
 
 bool ambiguous(const Situation& s, Localization& result) {
@@ -259,7 +314,7 @@ void decide(const Situation& s, Localization& result) {
                     result.inliers, s.crossings.size(), s.outline.name));
     return;
   }
-  if (too_vague(s, result)) return;
+  if (too_vague(s, result) || hangs_on_few(s, result)) return;
   if (s.options.full_reject_checks && ambiguous(s, result)) return;
   if (out_of_range(s, result)) return;
   say(result, Verdict::Weld, "ok",

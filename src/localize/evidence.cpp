@@ -25,7 +25,6 @@ std::vector<Piece> in_part(std::span<const PathPiece> path, const CentredPose& p
   std::vector<Piece> out;
   out.reserve(path.size());
   for (const PathPiece& p : path) {
-    if (!std::isfinite(p.x0_mm + p.y0_mm + p.x1_mm + p.y1_mm)) continue;
     out.push_back({place(p.x0_mm, p.y0_mm), place(p.x1_mm, p.y1_mm)});
   }
   return out;

@@ -163,6 +163,9 @@ class Refinement {
     fit_.matches.resize(crossings.size());
     fit_.residuals.assign(crossings.size(), 0);
     fit_.inlier.assign(crossings.size(), 0);
+    // Until a step has succeeded nothing is known.
+    fit_.covariance.diagonal().setConstant(1e6);
+    fit_.member_covariance.assign(free_.size(), 1e6 * Eigen::Matrix3d::Identity());
     if (!any_speed(crossings)) priors_.latency_ms = 0;
   }
 
@@ -179,6 +182,8 @@ class Refinement {
     fit_.state = coarse.fit_.state;
     fit_.scale = coarse.fit_.scale;
     fit_.iterations = coarse.fit_.iterations;
+    fit_.covariance = coarse.fit_.covariance;
+    fit_.member_covariance = coarse.fit_.member_covariance;
   }
   Fit run() {
     for (int step = 0; step < 4; ++step) iterate(step);

@@ -1,8 +1,13 @@
 #include "weldcell/localize/localize.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
+#include <limits>
 
 #include "decide.hpp"
 #include "evidence.hpp"
@@ -265,10 +270,54 @@ Localization refused(Verdict verdict, const char* cause, std::string reason, std
   return out;
 }
 
-bool sane(const LocalizeOptions& o) {
-  return std::isfinite(o.planned.x_mm + o.planned.y_mm + o.planned.theta_rad) && o.range_mm >= 0 &&
-         o.range_mm <= 2000 && o.range_rad >= 0 && std::isfinite(o.range_rad) && o.latency_sigma_s >= 0 &&
-         o.inset_sigma_mm >= 0 && o.member_shift_sigma_mm >= 0 && o.member_angle_sigma_rad >= 0;
+/// The first option that is no sensible number, with its value and its limits; empty when all are sound.
+std::string wrong_option(const LocalizeOptions& o) {
+  struct Limit {
+    const char* name;
+    double value, low, high;
+  };
+  constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+  for (const Limit& l :
+       {Limit{"planned.x_mm", o.planned.x_mm, -kFarthest_mm, kFarthest_mm},
+        Limit{"planned.y_mm", o.planned.y_mm, -kFarthest_mm, kFarthest_mm},
+        Limit{"planned.theta_rad", o.planned.theta_rad, -1e3, 1e3}, Limit{"range_mm", o.range_mm, 0, 2000},
+        Limit{"range_rad", o.range_rad, 0, 1e3}, Limit{"max_offset_mm", o.max_offset_mm, 0, kNoLimit},
+        Limit{"max_rotation_rad", o.max_rotation_rad, 0, kNoLimit},
+        Limit{"max_member_shift_mm", o.max_member_shift_mm, 0, kNoLimit},
+        Limit{"max_mean_error_mm", o.max_mean_error_mm, 0, kNoLimit},
+        Limit{"latency_sigma_s", o.latency_sigma_s, 0, 1}, Limit{"inset_sigma_mm", o.inset_sigma_mm, 0, 100},
+        Limit{"member_shift_sigma_mm", o.member_shift_sigma_mm, 0, 100},
+        Limit{"member_angle_sigma_rad", o.member_angle_sigma_rad, 0, kPi}}) {
+    if (l.value >= l.low && l.value <= l.high) continue;
+    return fmt::format("{} is {:g}, but must lie between {:g} and {:g}", l.name, l.value, l.low, l.high);
+  }
+  return {};
+}
+
+/// Noise and a member's slight turn keep the points of one straight side within this of a line.
+constexpr double kOneLine_mm = 2;
+
+/// Whether all points lie at one spot or along the line between two that are about the farthest apart.
+bool on_one_line(const std::vector<Crossing>& crossings) {
+  const auto farthest = [&](const Vec2& from) {
+    return std::max_element(crossings.begin(), crossings.end(),
+                            [&](const Crossing& a, const Crossing& b) {
+                              return (a.point - from).squaredNorm() < (b.point - from).squaredNorm();
+                            })
+        ->point;
+  };
+  const Vec2 a = farthest(crossings.front().point), b = farthest(a);
+  const double length = (b - a).norm();
+  if (length <= kOneLine_mm) return true;
+  const Vec2 n = Vec2(a.y() - b.y(), b.x() - a.x()) / length;
+  return std::all_of(crossings.begin(), crossings.end(),
+                     [&](const Crossing& c) { return std::abs(n.dot(c.point - a)) <= kOneLine_mm; });
+}
+
+bool sound(const PathPiece& p) {
+  return std::max({std::abs(p.x0_mm), std::abs(p.y0_mm), std::abs(p.x1_mm), std::abs(p.y1_mm)}) <
+             kFarthest_mm &&
+         std::isfinite(p.x0_mm + p.y0_mm + p.x1_mm + p.y1_mm);
 }
 
 }  // namespace
@@ -296,9 +345,9 @@ std::size_t Localizer::memory_bytes() const { return fields_->memory_bytes(); }
 
 Localization Localizer::localize(std::span<const EdgePoint> edges, std::span<const PathPiece> path,
                                  const LocalizeOptions& options) const {
-  if (!sane(options)) {
-    return refused(Verdict::Reject, "bad_options",
-                   "The range or a tolerance is no sensible number. Correct the job.", edges.size());
+  if (const std::string wrong = wrong_option(options); !wrong.empty()) {
+    return refused(Verdict::Reject, "bad_options", "The option " + wrong + ". Correct the job.",
+                   edges.size());
   }
   Crossings crossings = ready_crossings(edges, options.default_sigma_mm);
   if (10 * static_cast<std::size_t>(crossings.broken) > edges.size()) {
@@ -308,14 +357,37 @@ Localization Localizer::localize(std::span<const EdgePoint> edges, std::span<con
                    edges.size());
   }
   if (crossings.list.size() < kMinPoints) {
-    return refused(Verdict::Rescan, "too_few_points",
-                   "Only " + std::to_string(crossings.list.size()) +
-                       " edge points were seen. Check that the part lies under the scan and scan again.",
+    return refused(
+        Verdict::Rescan, "too_few_points",
+        fmt::format("Too few different edge points were seen: {} of at least {}. Check that the part lies "
+                    "under the scan and scan again.",
+                    crossings.list.size(), kMinPoints),
+        edges.size());
+  }
+  if (on_one_line(crossings.list)) {
+    return refused(Verdict::Rescan, "one_line",
+                   fmt::format("All {} edge points lie on one straight line, which leaves the place along it "
+                               "open. Scan across other sides of the part too.",
+                               crossings.list.size()),
                    edges.size());
   }
-  if (options.method == Method::Paper) return paper::localize(*outline_, edges, options);
+  // A path that cannot be trusted would take its negative evidence along without a word.
+  std::vector<PathPiece> sound_path;
+  if (const auto broken = std::count_if(path.begin(), path.end(), std::not_fn(sound)); broken > 0) {
+    if (10 * static_cast<std::size_t>(broken) > path.size()) {
+      return refused(Verdict::Reject, "bad_path",
+                     fmt::format("{} of {} pieces of the scan path are no numbers. Check the robot's pose "
+                                 "stream and scan again.",
+                                 broken, path.size()),
+                     edges.size());
+    }
+    std::copy_if(path.begin(), path.end(), std::back_inserter(sound_path), sound);
+    path = sound_path;
+  }
   if (crossings.list.size() > kMaxFitPoints) crossings.list = sampled(crossings.list, kMaxFitPoints);
-
+  if (options.method == Method::Paper) {
+    return paper::localize(*outline_, crossings.list, edges.size(), options);
+  }
   Localization result;
   Solver solver(*outline_, *fields_, crossings.list, path, options);
   if (!solver.run(edges, result)) {

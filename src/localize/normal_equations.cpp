@@ -14,7 +14,7 @@ namespace {
 constexpr double kPoseSigma_mm = 200;
 constexpr double kPoseSigma_rad = 1;
 
-double precision(double sigma) { return sigma > 0 ? 1 / (sigma * sigma) : 1e12; }
+double precision(double sigma) { return sigma > 1e-6 ? 1 / (sigma * sigma) : 1e12; }
 
 CommonMatrix prior_information(const Priors& priors) {
   CommonMatrix out = CommonMatrix::Zero();

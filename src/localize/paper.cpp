@@ -173,15 +173,12 @@ double orientation(const std::vector<Vec2>& points, const std::vector<Segment>& 
 
 }  // namespace
 
-Localization localize(const workpiece::OutlineTemplate& outline, std::span<const EdgePoint> edges,
-                      const LocalizeOptions& options) {
+Localization localize(const workpiece::OutlineTemplate& outline, const std::vector<Crossing>& crossings,
+                      std::size_t point_count, const LocalizeOptions& options) {
   const std::vector<Segment> segments = segments_of(outline);
   std::vector<Vec2> points;
   Vec2 mass = Vec2::Zero();
-  for (const EdgePoint& e : edges) {
-    if (std::isfinite(e.x_mm) && std::isfinite(e.y_mm))
-      points.emplace_back(e.x_mm, e.y_mm), mass += points.back();
-  }
+  for (const Crossing& c : crossings) points.push_back(c.point), mass += c.point;
   mass /= static_cast<double>(points.size());
   const double turn = orientation(points, segments, options.planned.theta_rad);
   const Cost cost = [&](const Parameters& x) {
@@ -206,11 +203,11 @@ Localization localize(const workpiece::OutlineTemplate& outline, std::span<const
   out.centroid_base = best.head<2>();
   const Vec2 t = out.centroid_base - Pose2{0, 0, theta}.rotate(outline.centroid);
   out.pose = {t.x(), t.y(), theta};
-  out.points = static_cast<int>(edges.size());
+  out.points = static_cast<int>(point_count);
   out.mean_error_mm = lowest / static_cast<double>(points.size());
   out.inliers = static_cast<int>(points.size());
-  out.edge_of_point.assign(edges.size(), -1);
-  out.residual_mm.assign(edges.size(), 0);
+  out.edge_of_point.assign(point_count, -1);
+  out.residual_mm.assign(point_count, 0);
   const bool accepted = out.mean_error_mm <= options.max_mean_error_mm;
   out.verdict = accepted ? Verdict::Weld : Verdict::Reject;
   out.cause = accepted ? "ok" : "mean_error";

@@ -2,15 +2,17 @@
 // shortest distances, accepted when the mean error is at most 2.5 mm. Pure.
 #pragma once
 
-#include <span>
+#include <cstddef>
+#include <vector>
 
+#include "crossings.hpp"
 #include "weldcell/localize/localize.hpp"
 
 namespace weldcell::localize::paper {
 
-/// Needs at least one finite edge point. Covariance, latency and members are not part of the method and stay
-/// empty.
-Localization localize(const workpiece::OutlineTemplate& outline, std::span<const EdgePoint> edges,
-                      const LocalizeOptions& options);
+/// Needs at least one crossing; point_count is the number of edge points that they come from. Covariance,
+/// latency and members are not part of the method and stay empty.
+Localization localize(const workpiece::OutlineTemplate& outline, const std::vector<Crossing>& crossings,
+                      std::size_t point_count, const LocalizeOptions& options);
 
 }  // namespace weldcell::localize::paper

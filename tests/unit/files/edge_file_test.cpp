@@ -46,6 +46,32 @@ TEST(EdgeFile, SaysEachFaultWithItsLine) {
   EXPECT_THAT(found, HasSubstr("e.csv:8: x_mm: '1e7' is out of range"));
 }
 
+TEST(EdgeFile, TakesAByteOrderMarkAndShowsNoControlCharacters) {
+  EXPECT_EQ(faults_of("\xEF\xBB\xBFx_mm,y_mm,dir_x,dir_y,step\n1,2,1,0,1\n"), "");
+  const std::string header = "x_mm,y_mm,dir_x,dir_y,step\n";
+  EXPECT_THAT(faults_of(header + "\x1b[31m,2,1,0,1\n"), HasSubstr("e.csv:2: x_mm: '?[31m' is not a finite"));
+  EXPECT_THAT(faults_of("\x1b[2J\x01\n1\n"), HasSubstr("e.csv:1: ?[2J?: unknown column"));
+  EXPECT_THAT(faults_of(header + std::string(90, '9') + ",2,1,0,1\n"),
+              HasSubstr("x_mm: '" + std::string(40, '9') + "...' is out of range"));
+  EXPECT_THAT(faults_of(header + "1,2,1,0,1,\n"), HasSubstr("e.csv:2: has 6 fields: the header has 5"));
+}
+
+TEST(EdgeFile, NegativeSigmaAndSpeedAreNamed) {
+  const std::string header = "x_mm,y_mm,dir_x,dir_y,step,sigma_mm,speed_mm_s\n";
+  EXPECT_THAT(faults_of(header + "1,2,1,0,1,-0.3,200\n"),
+              HasSubstr("e.csv:2: sigma_mm: is negative: 0 = unknown"));
+  EXPECT_THAT(faults_of(header + "1,2,1,0,1,0.3,-200\n"), HasSubstr("e.csv:2: speed_mm_s: is negative"));
+  EXPECT_THAT(faults_of(header + "1,2,1,0,1,inf,200\n"), HasSubstr("sigma_mm: 'inf' is not a finite number"));
+  EXPECT_THAT(faults_of(header + "1,2,1,0,1,,200\n"), HasSubstr("sigma_mm: '' is not a finite number"));
+}
+
+TEST(EdgeFile, MoreThanAMillionRowsAreRefused) {
+  std::string csv = "x_mm,y_mm,dir_x,dir_y,step\n";
+  for (int i = 0; i < 1'000'000; ++i) csv += "1,2,1,0,1\n";
+  EXPECT_EQ(faults_of(csv), "");
+  EXPECT_THAT(faults_of(csv + "1,2,1,0,1\n"), HasSubstr("more than 1000000 rows: split the file"));
+}
+
 TEST(EdgeFile, StopsAfterFiftyFaults) {
   std::string csv = "x_mm,y_mm,dir_x,dir_y,step\n";
   for (int i = 0; i < 1000; ++i) csv += "x,2,1,0,1\n";

@@ -77,6 +77,57 @@ TEST_F(Garbage, APointSeenAThousandTimesCountsOnce) {
   EXPECT_NEAR(once.covariance(0, 0), many.covariance(0, 0), 1e-9);
 }
 
+TEST_F(Garbage, OneLineOfPointsIsNamedWhateverTheMethod) {
+  for (const double turn : {0.0, 0.7, kPi / 2}) {
+    std::vector<EdgePoint> edges;
+    for (int i = 0; i < 60; ++i) {
+      edges.push_back(
+          {-30 + 10 * i * std::cos(turn), -25 + 10 * i * std::sin(turn), 0, 1, 1, 0.3, 200, false});
+    }
+    for (const Method method : {Method::Robust, Method::Paper}) {
+      LocalizeOptions options;
+      options.method = method;
+      const Localization found = localizer_.localize(edges, set_.path, options);
+      EXPECT_EQ(found.verdict, Verdict::Rescan);
+      EXPECT_EQ(found.cause, "one_line") << found.reason;
+    }
+  }
+}
+
+TEST_F(Garbage, OneSpotIsOneLine) {
+  std::vector<EdgePoint> edges;
+  for (int i = 0; i < 60; ++i) edges.push_back({10 + 1e-3 * i, 5, 1, 0, 1, 0.3, 200, false});
+  EXPECT_EQ(run(edges).cause, "one_line");
+}
+
+TEST_F(Garbage, OnePointManyTimesIsTooFew) {
+  const Localization found = run(std::vector<EdgePoint>(1000, set_.edges[3]));
+  EXPECT_EQ(found.verdict, Verdict::Rescan);
+  EXPECT_EQ(found.cause, "too_few_points");
+}
+
+TEST_F(Garbage, ABrokenPathIsNamedAndAFewBrokenPiecesAreLeftOut) {
+  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 1e300}) {
+    auto path = set_.path;
+    path[4].y1_mm = bad;
+    const Localization one = localizer_.localize(set_.edges, path, {});
+    EXPECT_EQ(one.verdict, Verdict::Weld) << one.reason;
+    for (PathPiece& p : path) p.x0_mm = bad;
+    const Localization all = localizer_.localize(set_.edges, path, {});
+    EXPECT_EQ(all.verdict, Verdict::Reject);
+    EXPECT_EQ(all.cause, "bad_path") << all.reason;
+  }
+}
+
+TEST_F(Garbage, TwoParallelLinesAreNotEnough) {
+  std::vector<EdgePoint> edges;
+  for (int i = 0; i < 60; ++i) {
+    edges.push_back({-300.0 + 10 * i, -250, 0, 1, 1, 0.3, 200, false});
+    edges.push_back({-300.0 + 10 * i, -210, 0, 1, -1, 0.3, 200, false});
+  }
+  EXPECT_NE(localizer_.localize(edges, {}, {}).verdict, Verdict::Weld);
+}
+
 TEST_F(Garbage, OneEdgeOnlyIsNotEnough) {
   std::vector<EdgePoint> edges;
   for (int i = 0; i < 60; ++i) edges.push_back({-300.0 + 10 * i, -250, 0, 1, 1, 0.3, 200, false});
@@ -120,13 +171,47 @@ TEST_F(Garbage, AMillionPointsEnd) {
   EXPECT_NEAR(found.pose.x_mm, set_.truth.x_mm, 0.5);
 }
 
-TEST_F(Garbage, SenselessOptionsAreRefused) {
-  LocalizeOptions options;
-  options.range_mm = std::nan("");
-  EXPECT_EQ(localizer_.localize(set_.edges, set_.path, options).cause, "bad_options");
-  options = {};
-  options.planned.x_mm = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(localizer_.localize(set_.edges, set_.path, options).cause, "bad_options");
+TEST_F(Garbage, SenselessOptionsAreRefusedByName) {
+  const std::vector<std::pair<std::string, double LocalizeOptions::*>> fields{
+      {"range_mm", &LocalizeOptions::range_mm},
+      {"range_rad", &LocalizeOptions::range_rad},
+      {"max_offset_mm", &LocalizeOptions::max_offset_mm},
+      {"max_rotation_rad", &LocalizeOptions::max_rotation_rad},
+      {"max_member_shift_mm", &LocalizeOptions::max_member_shift_mm},
+      {"max_mean_error_mm", &LocalizeOptions::max_mean_error_mm},
+      {"latency_sigma_s", &LocalizeOptions::latency_sigma_s},
+      {"inset_sigma_mm", &LocalizeOptions::inset_sigma_mm},
+      {"member_shift_sigma_mm", &LocalizeOptions::member_shift_sigma_mm},
+      {"member_angle_sigma_rad", &LocalizeOptions::member_angle_sigma_rad}};
+  for (const auto& [name, field] : fields) {
+    for (const double bad : {std::nan(""), -1.0, -std::numeric_limits<double>::infinity()}) {
+      LocalizeOptions options;
+      options.*field = bad;
+      const Localization found = localizer_.localize(set_.edges, set_.path, options);
+      EXPECT_EQ(found.verdict, Verdict::Reject);
+      EXPECT_EQ(found.cause, "bad_options");
+      EXPECT_NE(found.reason.find(name), std::string::npos) << found.reason;
+    }
+  }
+  for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity(), 1e300}) {
+    LocalizeOptions options;
+    options.planned.x_mm = bad;
+    const Localization found = localizer_.localize(set_.edges, set_.path, options);
+    EXPECT_EQ(found.cause, "bad_options");
+    EXPECT_NE(found.reason.find("planned.x_mm"), std::string::npos) << found.reason;
+  }
+}
+
+TEST_F(Garbage, SigmasOfOptionsThatAreNearlyNothingHoldTheirTerm) {
+  for (const double tiny : {0.0, 1e-320, 1e-200, 1e-9}) {
+    LocalizeOptions options;
+    options.latency_sigma_s = options.inset_sigma_mm = tiny;
+    options.member_shift_sigma_mm = options.member_angle_sigma_rad = tiny;
+    const Localization found = localizer_.localize(set_.edges, set_.path, options);
+    EXPECT_NEAR(found.pose.x_mm, set_.truth.x_mm, 0.5) << tiny;
+    EXPECT_TRUE(found.covariance.allFinite()) << tiny;
+    EXPECT_GT(found.covariance(0, 0), 0) << tiny;
+  }
 }
 
 TEST_F(Garbage, TheOrderOfThePointsDoesNotMatter) {
@@ -147,6 +232,20 @@ TEST_F(Garbage, APartOutsideTheRangeIsRefusedByName) {
   const Localization found = localizer_.localize(edges, path, {});
   EXPECT_EQ(found.verdict, Verdict::Reject);
   EXPECT_EQ(found.cause, "out_of_range") << found.reason;
+}
+
+TEST_F(Garbage, ThePaperMethodLeavesBrokenPointsOut) {
+  LocalizeOptions options;
+  options.method = Method::Paper;
+  auto edges = set_.edges;
+  edges[5].y_mm = std::nan("");
+  edges[9].x_mm = 1e300;
+  const Localization found = localizer_.localize(edges, {}, options);
+  EXPECT_NEAR(found.pose.x_mm, set_.truth.x_mm, 0.5);
+  EXPECT_EQ(found.edge_of_point.size(), edges.size());
+  for (EdgePoint& e : edges) e.x_mm = std::nan("");
+  EXPECT_EQ(localizer_.localize(edges, {}, options).cause, "bad_points");
+  EXPECT_EQ(localizer_.localize({}, {}, options).cause, "too_few_points");
 }
 
 TEST_F(Garbage, ThePaperMethodFindsTheSamePlace) {
