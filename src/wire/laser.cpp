@@ -56,20 +56,52 @@ const char* laser_code_text(std::uint32_t code) {
   switch (code) {
     case 0:
       return "valid";
+    case 16370:
+    case 262076:
+    case 0x7FFFFF04:
     case 0x7FFFFFFB:
       return "no peak";
+    case 16372:
+    case 262077:
+    case 0x7FFFFF05:
     case 0x7FFFFFFA:
       return "peak before the measuring range";
+    case 16374:
+    case 262078:
+    case 0x7FFFFF06:
     case 0x7FFFFFF9:
       return "peak behind the measuring range";
+    case 262079:
+    case 262080:
+    case 0x7FFFFF07:
     case 0x7FFFFFF8:
       return "measurement cannot be calculated";
+    case 16376:
     case 0x7FFFFFF7:
       return "peak cannot be evaluated";
+    case 262081:
     case 0x7FFFFFF6:
       return "peak too wide";
+    case 16378:
+    case 262082:
     case 0x7FFFFFF5:
       return "laser is off";
+    case 16380:
+      return "trigger too fast";
+    case 262073:
+      return "scaling underflow";
+    case 262074:
+      return "scaling overflow";
+    case 262075:
+      return "too much data for the baud rate";
+    case 0x7FFFFF08:
+      return "distance cannot be represented";
+    case kLaserBelowScale:
+      return "word below the channel's scale";
+    case kLaserAboveScale:
+      return "word above the channel's scale";
+    case 0x7FFFFFFF:
+      return "no value";
     default:
       return "unknown";
   }

@@ -11,11 +11,14 @@ namespace weldcell::wire {
 
 /// Words from here upwards are no distances but the sensor's reasons for having none.
 inline constexpr std::uint32_t kLaserFirstErrorCode = 0x7FFFFF00;
+/// A word beyond a Meas32 channel's scale by more than 1 % of it: a broken current loop, or no target.
+inline constexpr std::uint32_t kLaserBelowScale = 0x7FFFFFE0, kLaserAboveScale = 0x7FFFFFE1;
 
 /// One reading. Error codes of the sensor are kept as evidence.
 struct LaserReading {
-  float distance_mm = 0;   ///< 0 at the start of the measuring range; undefined when code != 0
-  std::uint32_t code = 0;  ///< 0 = valid, else the sensor's error word (0x7FFFFF00..0x7FFFFFFF)
+  float distance_mm = 0;  ///< 0 at the start of the measuring range; undefined when code != 0
+  std::uint32_t code =
+      0;  ///< 0 = valid, else the sensor's error word as sent (0x7FFFFF00.., 16370.., 262073..)
   std::uint32_t counter =
       0;  ///< running number of the reading, unwrapped modulo 2^32 from the first 24 bits seen
   std::uint32_t timestamp_us = 0;  ///< device clock; wraps; 0 when the stream has none

@@ -1,0 +1,359 @@
+#include "weldcell/wire/laser_dialects.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "unit/wire/egm_golden.hpp"
+
+namespace weldcell::wire {
+namespace {
+
+using Stream = std::vector<std::byte>;
+using Readings = std::vector<LaserReading>;
+
+// clang-format off
+constexpr const char* kData28 =
+    "44415441" "15cd5b07" "b168de3a"  // "DATA", order number, serial number
+    "00000000" "0c000000" "02000000"  // no video, 12 bytes a frame, 2 frames
+    "feffffff"                        // counter of the first frame 2^32 - 2
+    "00020000" "40420f00" "40e20100"  // intensity 0.5, 1.000000 mm, 123456 us
+    "00000000" "04ffff7f" "a4e20100";  // no peak, 123556 us
+constexpr const char* kMeas32 =
+    "5341454d" "15cd5b07" "b168de3a"            // preamble, order number, serial number
+    "0500000000000000" "00000000"              // channels 1 and 2 there, status
+    "0300" "0800" "07000000"                   // 3 frames of 8 bytes, counter 7
+    "11110000" "ed3d0000"                      // channel 2: 15853
+    "11110000" "bd0c0000"                      // 3261
+    "11110000" "00000000";                     // 0: beyond the end of the inverted scale
+constexpr const char* kTwoByte =
+    "8121"   // 161: start of the range
+    "fe4f"   // 16207: its end
+    "ff72";  // 16370: no object
+constexpr const char* kThreeByte =
+    "034a80"   // 643: start of the range
+    "2d758f"   // 64877: its end
+    "0c7fbf";  // 262092: above every code known, kept all the same
+constexpr const char* kOd5000 =
+    "d01c" "40000401" "1db7ea6e" "003a24fe"  // 28 bytes follow, status, 498592366 ns, counter 3810558
+    "00e8e450" "7fffffff"                    // channel A 15.262800 mm, channel B none
+    "00e8e451" "00000001";                   // 15.262801 mm, 0.000001 mm
+// clang-format on
+
+LaserFormat format_of(LaserDialect dialect) {
+  LaserFormat f;
+  f.dialect = dialect;
+  f.range_mm = 100;
+  f.rate_hz = 10000;
+  if (dialect == LaserDialect::Data28) f.words = 3, f.distance_word = 1, f.timestamp_word = 2;
+  if (dialect == LaserDialect::Meas32) {
+    f.words = 2, f.distance_word = 1;
+    f.range_mm = 50, f.offset_mm = 35, f.raw_min = 15853, f.raw_max = 3261;
+  }
+  if (dialect == LaserDialect::Od5000) f.words = 2;
+  return f;
+}
+
+Readings decode(const LaserFormat& format, const Stream& stream, LaserCounters* counters = nullptr) {
+  LaserDecoder decoder(format);
+  Readings out;
+  decoder.feed(stream, [&](const LaserReading& r) { out.push_back(r); });
+  if (counters) *counters = decoder.counters();
+  return out;
+}
+
+bool same(const LaserReading& a, const LaserReading& b) {
+  return a.counter == b.counter && a.timestamp_us == b.timestamp_us && a.code == b.code &&
+         a.distance_mm == b.distance_mm;
+}
+
+void put(Stream& s, std::uint32_t value, std::size_t bytes, bool big = false) {
+  for (std::size_t i = 0; i < bytes; ++i) {
+    s.push_back(static_cast<std::byte>(value >> 8 * (big ? bytes - 1 - i : i) & 0xFF));
+  }
+}
+
+/// One block (block dialects) or so many readings (byte dialects) from a number on.
+void put_block(Stream& s, LaserDialect dialect, std::uint32_t from, std::uint32_t frames) {
+  const bool od = dialect == LaserDialect::Od5000;
+  if (dialect == LaserDialect::Data28) {
+    for (const std::uint32_t v : {0x41544144U, 1U, 2U, 0U, 12U, frames, from}) put(s, v, 4);
+  } else if (dialect == LaserDialect::Meas32) {
+    for (const std::uint32_t v : {0x4D454153U, 1U, 2U, 5U, 0U, 0U, frames | 8U << 16, from}) put(s, v, 4);
+  } else if (od) {
+    put(s, 0xD000 | (12 + 8 * frames), 2, true);
+    put(s, 0x40000401, 4, true);
+    put(s, static_cast<std::uint32_t>(std::uint64_t{from + 500000} * 100'000 % 1'000'000'000), 4, true);
+    put(s, from, 4, true);
+  }
+  for (std::uint32_t n = from; n != from + frames; ++n) {
+    const bool bad = n % 7 == 3;
+    if (dialect == LaserDialect::Data28) {
+      put(s, 0x200, 4);
+      put(s, bad ? 0x7FFFFF05 : 20'000'000 + n % 1000 * 1000, 4);
+      put(s, n * 100, 4);
+    } else if (dialect == LaserDialect::Meas32) {
+      put(s, 0x1111, 4);
+      put(s, bad ? 100 : 4000 + n % 9000, 4);
+    } else if (od) {
+      put(s, bad ? 0x7FFFFFFF : 15'000'000 + n % 1000, 4, true);
+      put(s, 5, 4, true);
+    } else if (dialect == LaserDialect::TwoByte) {
+      const std::uint32_t raw = bad ? 16374 : 200 + n % 16000;
+      put(s, 0x80 | raw >> 7, 1);
+      put(s, raw & 0x7F, 1);
+    } else {
+      const std::uint32_t raw = bad ? 262077 : 700 + n % 64000;
+      put(s, raw & 0x3F, 1);
+      put(s, 0x40 | (raw >> 6 & 0x3F), 1);
+      put(s, 0x80 | raw >> 12, 1);
+    }
+  }
+}
+
+Stream blocks(LaserDialect dialect, std::uint32_t from, std::uint32_t count, std::uint32_t frames = 5) {
+  Stream s;
+  for (std::uint32_t b = 0; b < count; ++b) put_block(s, dialect, from + b * frames, frames);
+  return s;
+}
+
+bool counts_itself(LaserDialect d) { return d != LaserDialect::TwoByte && d != LaserDialect::ThreeByte; }
+
+class EachDialect : public testing::TestWithParam<LaserDialect> {};
+INSTANTIATE_TEST_SUITE_P(Lasers, EachDialect,
+                         testing::Values(LaserDialect::Data28, LaserDialect::Meas32, LaserDialect::TwoByte,
+                                         LaserDialect::ThreeByte, LaserDialect::Od5000));
+
+TEST(LaserDialects, Data28Golden) {
+  const auto r = decode(format_of(LaserDialect::Data28), golden::bytes(kData28));
+  ASSERT_EQ(r.size(), 2U);
+  EXPECT_TRUE(same(r[0], {1.0F, 0, 0xFFFFFFFE, 123456}));
+  EXPECT_EQ(r[1].code, 0x7FFFFF04U);
+  EXPECT_STREQ(laser_code_text(r[1].code), "no peak");
+  EXPECT_EQ(r[1].counter, 0xFFFFFFFFU);
+  EXPECT_EQ(r[1].timestamp_us, 123556U);
+}
+
+TEST(LaserDialects, Data28TakesTheBlocksLengthToo) {
+  Stream s = golden::bytes(kData28);
+  s[16] = std::byte{24};
+  EXPECT_EQ(decode(format_of(LaserDialect::Data28), s).size(), 2U);
+}
+
+TEST(LaserDialects, Meas32GoldenOnAnInvertedScale) {
+  const auto r = decode(format_of(LaserDialect::Meas32), golden::bytes(kMeas32));
+  ASSERT_EQ(r.size(), 3U);
+  EXPECT_TRUE(same(r[0], {35.0F, 0, 7, 0}));
+  EXPECT_TRUE(same(r[1], {85.0F, 0, 8, 0}));
+  EXPECT_EQ(r[2].code, kLaserAboveScale);
+}
+
+TEST(LaserDialects, TwoByteGolden) {
+  const auto r = decode(format_of(LaserDialect::TwoByte), golden::bytes(kTwoByte));
+  ASSERT_EQ(r.size(), 3U);
+  EXPECT_NEAR(r[0].distance_mm, 0, 0.007);  // a step is 0.0062 mm
+  EXPECT_NEAR(r[1].distance_mm, 100, 0.007);
+  EXPECT_EQ(r[2].code, 16370U);
+  EXPECT_STREQ(laser_code_text(r[2].code), "no peak");
+  EXPECT_EQ(r[2].counter, 2U);
+}
+
+TEST(LaserDialects, ThreeByteGolden) {
+  const auto r = decode(format_of(LaserDialect::ThreeByte), golden::bytes(kThreeByte));
+  ASSERT_EQ(r.size(), 3U);
+  EXPECT_NEAR(r[0].distance_mm, 0, 0.0016);  // a step is 0.00156 mm
+  EXPECT_NEAR(r[1].distance_mm, 100, 0.0016);
+  EXPECT_EQ(r[2].code, 262092U);
+  EXPECT_STREQ(laser_code_text(262082), "laser is off");
+}
+
+TEST(LaserDialects, Od5000Golden) {
+  LaserFormat f = format_of(LaserDialect::Od5000);
+  auto r = decode(f, golden::bytes(kOd5000));
+  ASSERT_EQ(r.size(), 2U);
+  EXPECT_TRUE(same(r[0], {15.2628F, 0, 3810558, 498592}));
+  EXPECT_TRUE(same(r[1], {15.262801F, 0, 3810559, 498692}));
+  f.distance_word = 1;
+  r = decode(f, golden::bytes(kOd5000));
+  EXPECT_EQ(r[0].code, 0x7FFFFFFFU);
+  EXPECT_TRUE(same(r[1], {0.000001F, 0, 3810559, 498692}));
+}
+
+TEST_P(EachDialect, EverySplitReadsTheSame) {
+  const LaserFormat f = format_of(GetParam());
+  const Stream s = blocks(GetParam(), 9996, 4);
+  const auto whole = decode(f, s);
+  ASSERT_EQ(whole.size(), 20U);
+  EXPECT_EQ(std::count_if(whole.begin(), whole.end(), [](const auto& r) { return r.code != 0; }), 3);
+  for (std::size_t first = 0; first <= s.size(); ++first) {
+    for (std::size_t second = first; second <= s.size(); second += 7) {
+      LaserDecoder decoder(f);
+      Readings out;
+      const auto sink = [&](const LaserReading& r) { out.push_back(r); };
+      decoder.feed(std::span(s).first(first), sink);
+      decoder.feed(std::span(s).subspan(first, second - first), sink);
+      decoder.feed(std::span(s).subspan(second), sink);
+      ASSERT_TRUE(std::equal(out.begin(), out.end(), whole.begin(), whole.end(), same))
+          << first << ' ' << second;
+      ASSERT_EQ(decoder.counters().resyncs, 0U);
+      ASSERT_EQ(decoder.counters().lost_readings, 0U);
+    }
+  }
+}
+
+TEST_P(EachDialect, DamageLosesNoMoreThanTheDamagedFrames) {
+  std::mt19937 random(20261126);
+  const LaserFormat f = format_of(GetParam());
+  const std::uint32_t count = 4000, frames = counts_itself(GetParam()) ? 5 : 1;
+  Stream s;
+  std::vector<std::size_t> starts;
+  for (std::uint32_t b = 0; b < count; ++b) {
+    starts.push_back(s.size());
+    put_block(s, GetParam(), 1000 + b * frames, frames);
+  }
+  starts.push_back(s.size());
+  const auto clean = decode(f, s);
+  ASSERT_EQ(clean.size(), std::size_t{count} * frames);
+  // Damaged: a frame with a bad byte, and the whole block when its header has one.
+  const std::size_t frame_bytes = counts_itself(GetParam()) ? 4 * f.words : starts[1];
+  std::vector<bool> damaged(clean.size());
+  for (std::uint32_t b = 0; b < count; ++b) {
+    const std::size_t header = starts[b + 1] - starts[b] - frames * frame_bytes;
+    for (std::size_t i = starts[b]; i < starts[b + 1]; ++i) {
+      if (random() % 100 != 0) continue;
+      s[i] ^= static_cast<std::byte>(1 + random() % 255);
+      const std::size_t in = i - starts[b];
+      for (std::uint32_t k = 0; k < frames; ++k) {
+        if (in < header || (in - header) / frame_bytes == k) damaged[b * frames + k] = true;
+      }
+    }
+  }
+  LaserCounters c;
+  const auto read = decode(f, s, &c);
+  // In order, so that every sound reading is found again by its values (and number, where the wire counts).
+  const std::uint32_t base = counts_itself(GetParam()) ? 1000 : 0;
+  std::size_t sound = 0, missing = 0;
+  std::vector<std::vector<LaserReading>> by_number(clean.size() + 100);
+  for (const auto& r : read) {
+    if (r.counter - base < by_number.size()) by_number[r.counter - base].push_back(r);
+  }
+  std::size_t behind = 0;
+  for (std::size_t i = 0; i < clean.size(); ++i) {
+    if (damaged[i]) continue;
+    ++sound;
+    bool found = false;
+    if (counts_itself(GetParam())) {
+      for (const auto& r : by_number[i]) found = found || same(r, clean[i]);
+    } else {
+      for (std::size_t k = behind; k < std::min(read.size(), behind + 40) && !found; ++k) {
+        found = read[k].code == clean[i].code && read[k].distance_mm == clean[i].distance_mm;
+        if (found) behind = k + 1;
+      }
+    }
+    if (!found) ++missing;
+  }
+  RecordProperty("sound", static_cast<int>(sound));
+  RecordProperty("missing", static_cast<int>(missing));
+  EXPECT_GT(sound, clean.size() / 3);
+  EXPECT_EQ(missing, 0U) << "of " << sound;
+  EXPECT_GT(c.resyncs, 0U);
+}
+
+TEST_P(EachDialect, BytesMissingAreCountedAndTheStreamIsFoundAgain) {
+  const LaserFormat f = format_of(GetParam());
+  const Stream s = blocks(GetParam(), 1000, 30);
+  const auto clean = decode(f, s);
+  for (std::size_t at = 0; at < s.size() / 2; ++at) {
+    Stream cut = s;
+    cut.erase(cut.begin() + static_cast<std::ptrdiff_t>(at));
+    LaserCounters c;
+    const auto read = decode(f, cut, &c);
+    ASSERT_GE(read.size() + 12, clean.size()) << at;
+    ASSERT_TRUE(std::equal(read.end() - 50, read.end(), clean.end() - 50, [&](const auto& a, const auto& b) {
+      return a.code == b.code && a.distance_mm == b.distance_mm && (at < 3 || same(a, b));
+    })) << at;
+    ASSERT_GT(c.resyncs, 0U) << at;
+  }
+}
+
+TEST_P(EachDialect, ResetForgetsTheStreamAndKeepsTheCounters) {
+  LaserDecoder decoder(format_of(GetParam()));
+  const Stream s = blocks(GetParam(), 50, 2);
+  std::size_t read = 0;
+  const auto sink = [&](const LaserReading&) { ++read; };
+  decoder.feed(std::span(s).first(s.size() - 1), sink);
+  decoder.reset();
+  decoder.feed(s, sink);
+  EXPECT_EQ(read, 19U);
+  EXPECT_EQ(decoder.counters().readings, 19U);
+  EXPECT_EQ(decoder.counters().resyncs, 0U);
+}
+
+TEST_P(EachDialect, ACountWrapsJumpsAndRestarts) {
+  if (!counts_itself(GetParam())) GTEST_SKIP() << "the dialect has no count";
+  const LaserFormat f = format_of(GetParam());
+  LaserCounters c;
+  auto read = decode(f, blocks(GetParam(), 0xFFFFFFFF - 11, 4), &c);
+  ASSERT_EQ(read.size(), 20U);
+  EXPECT_EQ(read.back().counter, 7U);
+  EXPECT_EQ(c.lost_readings + c.restarts + c.resyncs, 0U);
+
+  // 100 readings never sent: the block that says so first waits for the next to agree.
+  Stream s = blocks(GetParam(), 1000, 3);
+  const Stream later = blocks(GetParam(), 1115, 3);
+  s.insert(s.end(), later.begin(), later.end());
+  read = decode(f, s, &c);
+  EXPECT_EQ(read.size(), 25U);
+  EXPECT_EQ(read.back().counter, 1129U);
+  EXPECT_EQ(c.lost_readings, 105U);
+
+  s = blocks(GetParam(), 5000, 3);
+  const Stream anew = blocks(GetParam(), 0, 6);
+  s.insert(s.end(), anew.begin(), anew.end());
+  read = decode(f, s, &c);
+  EXPECT_EQ(c.restarts, 1U);
+  EXPECT_GE(read.size(), 35U);
+  EXPECT_EQ(read.back().counter, 29U);
+}
+
+TEST(LaserDialects, Od5000StampsGoOnOverTheSecond) {
+  const LaserFormat f = format_of(LaserDialect::Od5000);
+  Stream s = blocks(LaserDialect::Od5000, 9990, 4);
+  auto r = decode(f, s);
+  for (std::size_t i = 1; i < r.size(); ++i) EXPECT_EQ(r[i].timestamp_us - r[i - 1].timestamp_us, 100U);
+  // 2.5 s without packets: the count tells the whole seconds.
+  put_block(s, LaserDialect::Od5000, 10010 + 25000, 5);
+  put_block(s, LaserDialect::Od5000, 10010 + 25005, 5);
+  r = decode(f, s);
+  ASSERT_EQ(r.size(), 25U);
+  EXPECT_EQ(r.back().timestamp_us - r.front().timestamp_us, (35019U - 9990U) * 100);
+}
+
+TEST(LaserDialects, AFormatThatCannotBeDecodedIsRefused) {
+  for (const auto d : {LaserDialect::Data28, LaserDialect::Meas32, LaserDialect::TwoByte,
+                       LaserDialect::ThreeByte, LaserDialect::Od5000, LaserDialect::Meas28}) {
+    LaserFormat f = format_of(d);
+    EXPECT_EQ(laser_format_fault(f), nullptr);
+    if (d == LaserDialect::Meas28) continue;
+    f.distance_word = f.words;
+    EXPECT_NE(laser_format_fault(f), nullptr);
+  }
+  LaserFormat f = format_of(LaserDialect::TwoByte);
+  f.range_mm = 0;
+  EXPECT_NE(laser_format_fault(f), nullptr);
+  f = format_of(LaserDialect::Meas32);
+  f.raw_max = f.raw_min;
+  EXPECT_NE(laser_format_fault(f), nullptr);
+  f = format_of(LaserDialect::Od5000);
+  f.rate_hz = 0;
+  EXPECT_NE(laser_format_fault(f), nullptr);
+  f = format_of(LaserDialect::Data28);
+  f.timestamp_word = 1;
+  EXPECT_NE(laser_format_fault(f), nullptr);
+}
+
+}  // namespace
+}  // namespace weldcell::wire
