@@ -1,6 +1,6 @@
 // The arm in figures: kinematics against the reference vectors and against itself, tracking of the simulated
 // controller by the shipped RAPID module, and the limits as properties of random motions.
-// usage: bench_robot [--json] [--plans N]     default 10000
+// usage: bench_robot [--json] [--plans N]     default 10000; with --plans the random motions alone
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
@@ -9,6 +9,7 @@
 #include <random>
 #include <sstream>
 
+#include "bench/random_plans.hpp"
 #include "bench/rows.hpp"
 #include "egm.pb.h"
 #include "weldcell/app/robot_runner.hpp"
@@ -418,6 +419,53 @@ void tracking(std::vector<Row>& rows, const files::CellConfig& config) {
   rows.push_back({"stop at 200 mm/s, highest share of a jerk limit", stop.jerk, "", NAN, NAN, Better::None});
 }
 
+/// Every arm in turn in the demo cell: of twenty motions one is a spiral and two are lines, which take
+/// longest.
+void random_plans(std::vector<Row>& rows, const cell::CellSetup& demo, int count) {
+  std::vector<cell::CellSetup> cells;
+  for (const fs::path& path : files_in(WELDCELL_CONFIG "/robots", ".yaml")) {
+    cells.push_back(demo);
+    cells.back().arm = arm_of(path);
+  }
+  std::mt19937_64 random(kSeed);
+  PlanTally tally;
+  for (int n = 0; n < count; ++n) {
+    const int turn = n % 20;
+    const Motion motion = turn == 0 ? Motion::Spiral : turn < 3 ? Motion::Line : Motion::PointToPoint;
+    try_plan(cells[static_cast<std::size_t>(n) % cells.size()], motion, random, tally);
+  }
+  const std::string seed = " (seed " + std::to_string(kSeed) + ")";
+  rows.push_back({"random motions asked for" + seed, static_cast<double>(count), "", NAN, NAN, Better::None});
+  for (std::size_t k = 0; k < kMotionNames.size(); ++k) {
+    rows.push_back({std::string("planned: ") + kMotionNames[k], static_cast<double>(tally.planned[k]), "",
+                    NAN, 1, Better::Higher});
+  }
+  for (const auto& [cause, times] : tally.refused)
+    rows.push_back({"refused, " + cause, static_cast<double>(times), "", NAN, NAN, Better::None});
+  if (tally.broken > 0) std::fprintf(stderr, "bench_robot: first broken: %s\n", tally.first_broken.c_str());
+  rows.push_back({"plans that break a limit", static_cast<double>(tally.broken), "", NAN, 0});
+  const Shares& w = tally.worst;
+  const double most = 1 + kShareSlack;
+  rows.push_back({"worst share of a speed limit, stated", w.stated_speed, "", NAN, most});
+  rows.push_back({"worst share of an acceleration limit, stated", w.stated_acceleration, "", NAN, most});
+  rows.push_back({"worst share of a jerk limit, stated", w.stated_jerk, "", NAN, most});
+  rows.push_back({"worst share of a speed limit, differences", w.speed, "", NAN, most});
+  rows.push_back({"worst share of an acceleration limit, differences", w.acceleration, "", NAN, most});
+  rows.push_back({"worst share of a jerk limit, differences", w.jerk, "", NAN, most});
+  rows.push_back({"closest to a joint's range less margin", deg(w.range_excess_rad), "deg", NAN, 1e-7});
+  rows.push_back({"speed at either end, stated", deg(w.end_speed_rad_s), "deg/s", NAN, 1e-4});
+}
+
+/// The N of --plans N; `fallback` without it, -1 when it is no positive number.
+int plans_of(int argc, char** argv, int fallback) {
+  for (int i = 1; i < argc; ++i) {
+    if (std::string(argv[i]) != "--plans") continue;
+    const int count = i + 1 < argc ? std::atoi(argv[i + 1]) : 0;
+    return count > 0 ? count : -1;
+  }
+  return fallback;
+}
+
 }  // namespace
 }  // namespace weldcell::bench
 
@@ -429,9 +477,19 @@ int main(int argc, char** argv) {
     return 2;
   }
   const auto& config = std::get<files::CellConfig>(read);
+  const bool asked =
+      std::any_of(argv, argv + argc, [](const char* a) { return std::string(a) == "--plans"; });
+  const int plans = bench::plans_of(argc, argv, 10000);
+  if (plans < 0) {
+    std::fprintf(stderr, "bench_robot: --plans needs a number above 0, e.g. --plans 10000\n");
+    return 2;
+  }
   std::vector<bench::Row> rows;
-  bench::against_references(rows);
-  bench::against_itself(rows);
-  bench::tracking(rows, config);
+  if (!asked) {
+    bench::against_references(rows);
+    bench::against_itself(rows);
+    bench::tracking(rows, config);
+  }
+  bench::random_plans(rows, config.setup, plans);
   return bench::finish("robot", rows, bench::wants_json(argc, argv));
 }
