@@ -14,9 +14,6 @@ constexpr double kMmPerCount = 1e-6;
 constexpr std::uint32_t kLongestGap = 1U << 20;
 constexpr std::uint32_t kMostFrames = 65535;
 constexpr std::uint32_t kOdHead = 12;  ///< header bytes that an OD5000's length counts
-/// An OD5000's header is told by its count; after that many bytes without one, the count is taken as
-/// restarted.
-constexpr std::size_t kGiveUpCount = 16384;
 
 std::uint32_t at(const std::byte* p, int i) { return static_cast<std::uint32_t>(p[i]); }
 std::uint32_t little(const std::byte* p) {
