@@ -160,7 +160,7 @@ Status RobotRunner::make_ready() {
   } else if (*state != adapters::ControllerState::MotorsOn) {
     return Error{"robot.state", "robot controller",
                  std::string("controller state is ") + adapters::to_string(*state),
-                 "release the emergency stop or close the guard, then arm and resume"};
+                 "release the emergency stop or close the guard, press Motors On, then arm and resume"};
   }
   return make_resident();
 }
