@@ -1,4 +1,4 @@
-# cmake --install: programs, configuration samples, systemd unit.
+# cmake --install: programs, configuration samples, systemd unit with its user and spool directory.
 include(GNUInstallDirs)
 foreach(PROGRAM weldcelld weldcell weldcell-sim weldcell-cad)
   if(TARGET ${PROGRAM})
@@ -7,3 +7,5 @@ foreach(PROGRAM weldcelld weldcell weldcell-sim weldcell-cad)
 endforeach()
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/weldcell)
 install(FILES ${CMAKE_SOURCE_DIR}/systemd/weldcelld.service DESTINATION lib/systemd/system OPTIONAL)
+install(FILES ${CMAKE_SOURCE_DIR}/systemd/sysusers.d/weldcell.conf DESTINATION lib/sysusers.d)
+install(FILES ${CMAKE_SOURCE_DIR}/systemd/tmpfiles.d/weldcell.conf DESTINATION lib/tmpfiles.d)
