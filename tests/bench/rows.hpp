@@ -31,27 +31,39 @@ inline std::string number(double value) {
   return text;
 }
 
+inline void print_json(std::FILE* out, const std::string& bench, const std::vector<Row>& rows) {
+  std::fprintf(out, "{\"bench\": \"%s\", \"rows\": [", bench.c_str());
+  const char* comma = "";
+  for (const Row& r : rows) {
+    std::fprintf(out,
+                 "%s{\"name\": \"%s\", \"value\": %s, \"unit\": \"%s\", \"reference\": %s, \"target\": %s, "
+                 "\"met\": %s}",
+                 comma, r.name.c_str(), number(r.value).c_str(), r.unit.c_str(), number(r.reference).c_str(),
+                 number(r.target).c_str(), r.met() ? "true" : "false");
+    comma = ", ";
+  }
+  std::fprintf(out, "]}\n");
+}
+
+inline void print_table(const std::vector<Row>& rows) {
+  for (const Row& r : rows) {
+    std::printf("%-58s %12s %-10s reference %10s  target %10s  %s\n", r.name.c_str(), number(r.value).c_str(),
+                r.unit.c_str(), number(r.reference).c_str(), number(r.target).c_str(),
+                std::isnan(r.target) ? "" : (r.met() ? "met" : "MISSED"));
+  }
+}
+
 /// Prints and returns the exit code: 0 when every target is met, else 1.
 inline int finish(const std::string& bench, const std::vector<Row>& rows, bool json) {
-  bool all = true;
-  if (json) std::printf("{\"bench\": \"%s\", \"rows\": [", bench.c_str());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Row& r = rows[i];
-    all = all && r.met();
-    if (json) {
-      std::printf(
-          "%s{\"name\": \"%s\", \"value\": %s, \"unit\": \"%s\", \"reference\": %s, \"target\": %s, \"met\": "
-          "%s}",
-          i > 0 ? ", " : "", r.name.c_str(), number(r.value).c_str(), r.unit.c_str(),
-          number(r.reference).c_str(), number(r.target).c_str(), r.met() ? "true" : "false");
-    } else {
-      std::printf("%-58s %12s %-10s reference %10s  target %10s  %s\n", r.name.c_str(),
-                  number(r.value).c_str(), r.unit.c_str(), number(r.reference).c_str(),
-                  number(r.target).c_str(), std::isnan(r.target) ? "" : (r.met() ? "met" : "MISSED"));
-    }
+  if (json) {
+    print_json(stdout, bench, rows);
+  } else {
+    print_table(rows);
   }
-  if (json) std::printf("]}\n");
-  return all ? 0 : 1;
+  for (const Row& r : rows) {
+    if (!r.met()) return 1;
+  }
+  return 0;
 }
 
 inline bool wants_json(int argc, char** argv) {

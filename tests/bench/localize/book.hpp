@@ -15,7 +15,8 @@ struct BenchOptions {
   int trials = 300;
   int paper_trials = 12;  ///< the paper's method takes a hundred times longer
   std::uint64_t seed = 90417;
-  std::string only;  ///< rows whose name holds this word
+  std::string rows_file;  ///< also write the rows there as JSON, empty: not
+  std::string only;       ///< rows whose name holds this word
 };
 
 class Book {
@@ -51,6 +52,7 @@ void basin(Book& book);        // wide and extreme placements, the hard set
 void latency(Book& book);      // 8 ms between robot and sensor
 void wrong_parts(Book& book);  // mirrored, moved, missing, swapped, lengthened, turned
 void members(Book& book);      // members off the drawing, gaps of joints
+void peers(Book& book);        // the Point Cloud Library's ICP on the same scans
 void paper_table(Book& book);  // the paper's Table 1, its method and ours on the same scans
 void speed(Book& book);        // points, members, threads, against the paper's method
 
