@@ -102,12 +102,12 @@ json spread_json(const Spread& s) { return {{"std", s.std}, {"rms", s.rms}, {"wo
 int command_trials(Arguments arguments) {
   CommandLine line(
       arguments,
-      "usage: weldcell trials --workpiece NAME|SCENE.yaml [--count 150] [--seed 1] [--threads 2] [--weld] "
+      "usage: weldcell trials --workpiece SCENE|SCENE.yaml [--count 150] [--seed 1] [--threads 2] [--weld] "
       "[--json]\n"
       "Jobs with drawn placements, clocks, noise and latency through the whole chain in virtual time: "
       "planning,\n"
       "EGM bytes, laser bytes, alignment, edges, pose, certificates, RAPID; no sockets, no sleeping.\n"
-      "  --job JOB.yaml   the job (default config/jobs/demo-NAME.yaml)\n"
+      "  --job JOB.yaml   the job (default config/jobs/demo-WORKPIECE.yaml)\n"
       "  --cell CELL      the cell (default config/cell-demo.yaml)\n"
       "  --weld           also run the weld programs and measure the torch on the true seams\n"
       "  --each           a line a trial on stderr, and the log of those that failed\n"
@@ -127,13 +127,20 @@ int command_trials(Arguments arguments) {
   const std::string name = line.value("workpiece");
   trials.scene_file = name.find('.') == std::string::npos ? shared_file("scenes/" + name + ".yaml") : name;
   const std::string cell_file = line.value("cell", shared_file("cell-demo.yaml"));
-  const std::string job_file = line.value("job", shared_file("jobs/demo-" + name + ".yaml"));
   if (trials.scene_file.empty())
     return line.refuse("no scene for workpiece '" + name + "' under config/scenes");
 
   auto cell = files::read_cell_file(cell_file);
   if (const auto* faults = std::get_if<files::Faults>(&cell)) return line.refuse(files::text(*faults));
   trials.config = std::get<files::CellConfig>(std::move(cell));
+  auto first = sim::read_scene(trials.scene_file, trials.config, trials.seed);
+  if (const auto* faults = std::get_if<files::Faults>(&first)) return line.refuse(files::text(*faults));
+  // Scenes of one workpiece share its job.
+  const std::string& lies_there = std::get<sim::Scene>(first).workpiece.name;
+  const std::string job_file = line.value("job", shared_file("jobs/demo-" + lies_there + ".yaml"));
+  if (job_file.empty())
+    return line.refuse("no config/jobs/demo-" + lies_there + ".yaml for workpiece '" + lies_there +
+                       "': name a job by --job");
   auto bundle = load_job(job_file, "");
   if (const auto* fault = std::get_if<std::string>(&bundle)) return line.refuse(*fault);
   trials.job.order = std::get<JobBundle>(bundle).order;
@@ -143,8 +150,6 @@ int command_trials(Arguments arguments) {
   const auto resident = read_file(shared_file("rapid/WeldcellEgm.mod"));
   if (!resident.ok()) return line.refuse(resident.error().text());
   trials.job.resident_module = *resident;
-  auto first = sim::read_scene(trials.scene_file, trials.config, trials.seed);
-  if (const auto* faults = std::get_if<files::Faults>(&first)) return line.refuse(files::text(*faults));
 
   const std::vector<VirtualOutcome> outcomes = run(trials, std::get<sim::Scene>(first));
 

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "sim/laser_light.hpp"
 #include "sim/noise.hpp"
 #include "sim/surface.hpp"
+#include "weldcell/base/units.hpp"
 #include "weldcell/wire/laser.hpp"
 
 namespace weldcell::sim {
@@ -20,36 +22,56 @@ constexpr std::uint32_t kAfterRange = 0x7FFFFFF9;
 constexpr double kBlock_s = 0.004;
 constexpr double kLeastLight = 0.06;    // of a full spot: below it the sensor finds no peak
 constexpr double kPeaksApart_mm = 3.0;  // images farther apart than this are two peaks, not one
+constexpr double kWayRound_mm = 8;      // most that light by way of a member's side travels farther
 constexpr double kWire_ms = 0.05;       // floor of the transport
 constexpr std::uint32_t kOrderNumber = 4120176, kSerialNumber = 260021;
 
-enum Purpose : std::uint64_t { White = 1, Outlier, OutlierSize, Dropout, Transport, Speckle };
+enum Purpose : std::uint64_t {
+  White = 1,
+  Outlier,
+  OutlierSize,
+  Dropout,
+  Transport,
+  Speckle,
+  Secondary,
+  SecondarySize
+};
 
-/// Where in the spot, in units of its 1/e2 radius, and how much light.
+/// Where in the spot, in units of its 1/e2 radius.
 struct SpotPoint {
-  double x, y, weight;
+  double x, y;
   std::size_t shot;  ///< 0, 1, 2: which third of the exposure it stands for
 };
 
+constexpr std::size_t kSpotPoints = 60;
+
+/// Equal parts of the light of a Gaussian beam on a sunflower's spiral, each with its opposite: fine steps in
+/// every direction, where a grid has coarse ones along its rows, and the centre of light in the middle.
 std::vector<SpotPoint> spot_points(bool whole_spot) {
-  if (!whole_spot) return {{0, 0, 1, 1}};
+  if (!whole_spot) return {{0, 0, 1}};
+  const double golden_rad = kPi * (3 - std::sqrt(5.0));
   std::vector<SpotPoint> out;
-  double sum = 0;
-  for (int i = -4; i <= 4; ++i) {
-    for (int j = -2; j <= 2; ++j) {
-      const double x = i * 0.36, y = j * 0.65;
-      const double weight = std::exp(-2 * (x * x + y * y));
-      if (weight < 0.002) continue;
-      out.push_back({x, y, weight, static_cast<std::size_t>(i + 2 * j + 12) % 3});
-      sum += weight;
-    }
+  for (std::size_t i = 0; i < kSpotPoints / 2; ++i) {
+    const double outside =
+        1 - (static_cast<double>(i) + 0.5) / (kSpotPoints / 2);  // share of the light farther out
+    const double radius = std::sqrt(-std::log(outside) / 2), angle = golden_rad * static_cast<double>(i);
+    const double x = radius * std::cos(angle), y = radius * std::sin(angle);
+    out.push_back({x, y, i % 3});
+    out.push_back({-x, -y, 2 - i % 3});
   }
-  for (SpotPoint& point : out) point.weight /= sum;
   return out;
 }
 
+/// Light of one point of the spot, and its share of the spot.
 struct Seen {
-  double distance_mm, weight;
+  double distance_mm, light, share;
+};
+
+/// What the detector takes for its peak.
+struct Peak {
+  double distance_mm = -1;
+  double light = 0;  ///< brightness times share
+  double share = 0;  ///< of a full spot
 };
 
 }  // namespace
@@ -80,8 +102,11 @@ struct LaserDevice::State {
 
   double speckle(double x_mm, double y_mm) const;
   bool only_table(const Eigen::Vector3d& at_table, const Eigen::Vector3d& at_top, const Eigen::Vector3d& eye);
-  double look(const std::array<Eigen::Isometry3d, 3>& shots, double& light) const;
-  double centroid(std::array<Seen, 64>& seen, std::size_t count, double& light) const;
+  /// Light from a place on the top of a member, or on the table.
+  double shine(bool on_part, const Eigen::Isometry3d& laser, const Eigen::Vector3d& hit) const;
+  Peak look(const std::array<Eigen::Isometry3d, 3>& shots) const;
+  Peak strongest(std::array<Seen, kSpotPoints>& seen, std::size_t count) const;
+  Peak peak(const Eigen::Isometry3d& laser, HostTime t, std::uint64_t k, const PoseAt& pose_at);
   wire::LaserReading measure(std::uint64_t k, HostTime t, const PoseAt& pose_at);
   Eigen::Isometry3d beam(HostTime t, const PoseAt& pose_at) const {
     return pose_at(t).iso * setup.T_flange_laser.iso;
@@ -95,6 +120,7 @@ struct LaserDevice::State {
   const std::vector<SpotPoint> spot;
   const double baseline_mm;
   Surface surface;
+  ExposureLoop exposure;
   std::size_t per_block = 20;
   std::uint64_t next = 0;
   std::vector<wire::LaserReading> block;
@@ -123,13 +149,20 @@ double LaserDevice::State::speckle(double x_mm, double y_mm) const {
   return sum / std::sqrt(power);
 }
 
-/// Distance that the detector decodes along the beam, from every lit and visible point of the spot; light =
-/// share of a full spot in the peak that was taken.
-double LaserDevice::State::look(const std::array<Eigen::Isometry3d, 3>& shots, double& light) const {
+double LaserDevice::State::shine(bool on_part, const Eigen::Isometry3d& laser,
+                                 const Eigen::Vector3d& hit) const {
+  const Finish finish = on_part ? truth.part : truth.table;
+  if (finish == Finish::Ideal) return 1;
+  const Eigen::Vector3d eye = laser.translation() + baseline_mm * laser.linear().col(0);
+  return brightness(finish, laser.linear().col(2), (eye - hit).normalized(), hit, scene.seed);
+}
+
+/// What the detector makes of every lit and visible point of the spot.
+Peak LaserDevice::State::look(const std::array<Eigen::Isometry3d, 3>& shots) const {
   const double radius = truth.spot_mm / 2;
-  std::array<Seen, 64> seen{};
+  const double part = 1 / static_cast<double>(spot.size());
+  std::array<Seen, kSpotPoints> seen{};
   std::size_t count = 0;
-  light = 0;
   for (const SpotPoint& point : spot) {
     // The spot's points are dealt out to the begin, middle and end of the exposure: the motion's blur at one
     // spot's cost.
@@ -142,32 +175,30 @@ double LaserDevice::State::look(const std::array<Eigen::Isometry3d, 3>& shots, d
     if (z <= 0) continue;
     const Eigen::Vector3d hit = ray + z * down;
     if (truth.shadows && !surface.sees(hit, eye)) continue;
+    const bool on_part = hit.z() > surface.table_mm() + 1e-3;
     // The receiver takes a point beside the beam for one nearer or farther on it.
-    seen[count++] = {z * baseline_mm / (baseline_mm - dx), point.weight};
+    seen[count++] = {z * baseline_mm / (baseline_mm - dx), part * shine(on_part, laser, hit), part};
   }
-  return centroid(seen, count, light);
+  return strongest(seen, count);
 }
 
-double LaserDevice::State::centroid(std::array<Seen, 64>& seen, std::size_t count, double& light) const {
+Peak LaserDevice::State::strongest(std::array<Seen, kSpotPoints>& seen, std::size_t count) const {
   std::sort(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(count),
             [](const Seen& a, const Seen& b) { return a.distance_mm < b.distance_mm; });
-  double best = 0, best_image = 0;
+  Peak best;
   for (std::size_t begin = 0; begin < count;) {
-    double weight = 0, image = 0;
+    double light = 0, share = 0, image = 0;
     std::size_t i = begin;
     do {
-      weight += seen[i].weight;
-      image += seen[i].weight / seen[i].distance_mm;  // a place on the detector is linear in 1/distance
+      light += seen[i].light;
+      share += seen[i].share;
+      image += seen[i].light / seen[i].distance_mm;  // a place on the detector is linear in 1/distance
       ++i;
     } while (i < count && seen[i].distance_mm - seen[i - 1].distance_mm < kPeaksApart_mm);
-    if (weight > best) {
-      best = weight;
-      best_image = image / weight;
-    }
+    if (light > best.light) best = {light / image, light, share};
     begin = i;
   }
-  light = best;
-  return best > 0 ? 1 / best_image : -1;
+  return best;
 }
 
 /// Whether the beam and the receiver's view both keep clear of every member, so that only the table is seen.
@@ -186,6 +217,25 @@ bool LaserDevice::State::only_table(const Eigen::Vector3d& at_table, const Eigen
   return clear(at_top - at_table) && (!truth.shadows || clear(view));
 }
 
+Peak LaserDevice::State::peak(const Eigen::Isometry3d& laser, HostTime t, std::uint64_t k,
+                              const PoseAt& pose_at) {
+  const Eigen::Vector3d from = laser.translation(), down = laser.linear().col(2);
+  const double to_table = (from.z() - surface.table_mm()) / -down.z();
+  const double to_top = (from.z() - surface.top_mm()) / -down.z();
+  const Eigen::Vector3d at_top = from + to_top * down, at_table = from + to_table * down;
+  if (surface.around(at_top.x(), at_top.y()) == Surface::Around::Top)
+    return {to_top, shine(true, laser, at_top), 1};
+  if (only_table(at_table, at_top, from + baseline_mm * laser.linear().col(0)))
+    return {to_table, shine(false, laser, at_table), 1};
+  const Nanoseconds third = from_seconds(truth.exposure_ms * 1e-3 / 3);
+  Peak out = look({beam(t - third, pose_at), laser, beam(t + third, pose_at)});
+  if (out.distance_mm > 0.5 * (to_top + to_table) &&
+      uniform(mixed(scene.seed, k, Secondary)) < truth.secondary_share) {
+    out.distance_mm += 1 + (kWayRound_mm - 1) * uniform(mixed(scene.seed, k, SecondarySize));
+  }
+  return out;
+}
+
 wire::LaserReading LaserDevice::State::measure(std::uint64_t k, HostTime t, const PoseAt& pose_at) {
   const Eigen::Isometry3d laser = beam(t, pose_at);
   wire::LaserReading out;
@@ -196,27 +246,21 @@ wire::LaserReading LaserDevice::State::measure(std::uint64_t k, HostTime t, cons
   };
   const Eigen::Vector3d from = laser.translation(), down = laser.linear().col(2);
   if (down.z() > -0.05 || uniform(roll(Dropout)) < truth.dropout_share) return invalid(kNoPeak);
-  const double to_table = (from.z() - surface.table_mm()) / -down.z();
-  const double to_top = (from.z() - surface.top_mm()) / -down.z();
   const double end = setup.start_of_range_mm + setup.range_mm;
-  if (to_top > end + 5) return invalid(kAfterRange);
-  if (to_table < setup.start_of_range_mm) return invalid(kBeforeRange);
-  double light = 1, distance = 0;
-  const Eigen::Vector3d at_top = from + to_top * down, at_table = from + to_table * down;
-  if (surface.around(at_top.x(), at_top.y()) == Surface::Around::Top) {
-    distance = to_top;
-  } else if (only_table(at_table, at_top, from + baseline_mm * laser.linear().col(0))) {
-    distance = to_table;
-  } else {
-    const Nanoseconds third = from_seconds(truth.exposure_ms * 1e-3 / 3);
-    distance = look({beam(t - third, pose_at), laser, beam(t + third, pose_at)}, light);
-  }
-  if (light < kLeastLight || distance <= 0) return invalid(kNoPeak);
+  if ((from.z() - surface.top_mm()) / -down.z() > end + 5) return invalid(kAfterRange);
+  if ((from.z() - surface.table_mm()) / -down.z() < setup.start_of_range_mm) return invalid(kBeforeRange);
+  const Peak taken = peak(laser, t, k, pose_at);
+  ExposureLoop::Level level{1 / std::sqrt(std::max(taken.share, kLeastLight)), taken.share < kLeastLight};
+  if (truth.exposure_loop) level = exposure.next(taken.light);
+  const double distance = taken.distance_mm;
+  if (level.lost || distance <= 0) return invalid(kNoPeak);
   if (distance < setup.start_of_range_mm) return invalid(kBeforeRange);
   if (distance > end) return invalid(kAfterRange);
   double reading = distance - setup.start_of_range_mm;
   const Eigen::Vector3d hit = from + distance * down;
-  if (truth.noise_mm > 0) reading += truth.noise_mm * normal(roll(White)) / std::sqrt(light);
+  reading += linearity_error_mm(distance - setup.start_of_range_mm, setup.range_mm, truth.linearity_share);
+  if (truth.tilt_error) reading += tilt_error_mm(down, laser.linear().col(0), setup.range_mm);
+  if (truth.noise_mm > 0) reading += truth.noise_mm * normal(roll(White)) * level.noise_factor;
   if (truth.speckle_mm > 0) reading += truth.speckle_mm * speckle(hit.x(), hit.y());
   if (uniform(roll(Outlier)) < truth.outlier_share) {
     const double size = uniform(roll(OutlierSize));

@@ -20,6 +20,13 @@ using files::Node;
 const std::vector<std::string> kKinds{"laser_drop", "laser_stall", "egm_silence",  "estop",   "guardstop",
                                       "motors_off", "manual",      "program_stop", "restart", "rws_503"};
 
+constexpr files::Choice<Finish> kFinishes[] = {{"ideal", Finish::Ideal},
+                                               {"mill_scale", Finish::MillScale},
+                                               {"ground_steel", Finish::GroundSteel},
+                                               {"galvanized", Finish::Galvanized},
+                                               {"aluminium", Finish::Aluminium},
+                                               {"ceramic", Finish::Ceramic}};
+
 bool take_number(std::string_view text, double& out) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
   return error == std::errc{} && end == text.data() + text.size() && out >= 0;
@@ -144,6 +151,12 @@ class SceneReader {
     m.degrees("triangulation_deg", l.triangulation_rad, {2, 60});
     m.boolean("shadows", l.shadows);
     m.boolean("beam_spot", l.beam_spot);
+    m.choice("part", l.part, kFinishes);
+    m.choice("table", l.table, kFinishes);
+    m.boolean("exposure_loop", l.exposure_loop);
+    m.number("secondary_share", l.secondary_share, {0, 0.5});
+    m.number("linearity_share", l.linearity_share, {0, 0.01});
+    m.boolean("tilt_error", l.tilt_error);
   }
 
   void controller(Map& m) {

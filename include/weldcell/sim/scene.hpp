@@ -12,29 +12,10 @@
 #include "weldcell/files/cell_file.hpp"
 #include "weldcell/files/fault.hpp"
 #include "weldcell/geometry/plane.hpp"
+#include "weldcell/sim/laser_truth.hpp"
 #include "weldcell/workpiece/workpiece.hpp"
 
 namespace weldcell::sim {
-
-struct ClockTruth {
-  double offset_s = 0;  ///< device clock at host time 0
-  double drift_ppm = 0;
-};
-
-struct LaserTruth {
-  ClockTruth clock{12.3, 30};
-  double latency_ms = 2.7;  ///< stamp (and arrival) after mid-exposure
-  double exposure_ms = 0.2;
-  double transport_jitter_ms = 0.3;  ///< exponential, on the wire
-  double spot_mm = 1.1;
-  double noise_mm = 0.05;    ///< white, 1 sigma
-  double speckle_mm = 0.05;  ///< bound to the surface, correlated over half a spot
-  double outlier_share = 0.002;
-  double dropout_share = 0.001;
-  double triangulation_rad = 0.3;
-  bool shadows = true;
-  bool beam_spot = true;  ///< integrate over the spot; false: a needle
-};
 
 struct ControllerTruth {
   ClockTruth clock{28397.2, -15};

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "fixture.hpp"
+#include "sim/laser_light.hpp"
 #include "weldcell/wire/laser.hpp"
 
 namespace weldcell::sim {
@@ -193,6 +194,126 @@ TEST(Laser, DropLosesAndStallHoldsBack) {
   for (const LaserBlock& block : laser.advance({2 * kSecond + 100 * kMillisecond}, pose)) {
     EXPECT_GE(block.arrival.ns, 2 * kSecond + 500 * kMillisecond);
   }
+}
+
+TEST(LaserLight, BrightnessFollowsTheLobe) {
+  const Eigen::Vector3d down(0, 0, -1), place(0, 0, 500);
+  const auto at = [&](double off_deg) {
+    return Eigen::Vector3d(std::sin(rad(off_deg)), 0, std::cos(rad(off_deg)));
+  };
+  EXPECT_DOUBLE_EQ(brightness(Finish::Ideal, down, at(60), place, 1), 1);
+  EXPECT_NEAR(brightness(Finish::Ceramic, down, at(20), place, 1), std::cos(rad(20)), 1e-12);
+  // Ground steel: 0.35 (cos a + 0.5 exp(-(a / 5 deg)^2)).
+  EXPECT_NEAR(brightness(Finish::GroundSteel, down, at(5), place, 1),
+              0.35 * (std::cos(rad(5)) + 0.5 / std::exp(1)), 1e-9);
+  EXPECT_NEAR(brightness(Finish::GroundSteel, down, at(20), place, 1), 0.35 * std::cos(rad(20)), 1e-7);
+  // A beam that leans by a half of the receiver's angle throws its mirror image into it.
+  EXPECT_NEAR(brightness(Finish::GroundSteel, Eigen::Vector3d(std::sin(rad(10)), 0, -std::cos(rad(10))),
+                         at(10), place, 1),
+              0.35 * (std::cos(rad(10)) + 0.5), 1e-9);
+  double least = 9, most = 0;
+  for (int i = 0; i < 400; ++i) {
+    const double light = brightness(Finish::Galvanized, down, at(20), {8.0 * i, 0, 500}, 1);
+    least = std::min(least, light), most = std::max(most, light);
+  }
+  EXPECT_NEAR(least / (0.5 * std::cos(rad(20))), 0.5, 0.05);
+  EXPECT_NEAR(most / (0.5 * std::cos(rad(20))), 1.5, 0.05);
+}
+
+TEST(LaserLight, GainIsFourSamplesLate) {
+  ExposureLoop loop;
+  for (int i = 0; i < 8; ++i) loop.next(0.1);
+  EXPECT_NEAR(loop.next(0.1).noise_factor, 1, 1e-12);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(loop.next(0.5).noise_factor, 5) << i;  // five times too bright
+  EXPECT_NEAR(loop.next(0.5).noise_factor, 1, 1e-12);
+  for (int i = 0; i < 4; ++i)
+    EXPECT_NEAR(loop.next(0.25).noise_factor, std::sqrt(2), 1e-12) << i;  // half as bright
+  EXPECT_NEAR(loop.next(0.25).noise_factor, 1, 1e-12);
+  EXPECT_TRUE(loop.next(0.25 * 17).lost);    // burnt out
+  EXPECT_TRUE(loop.next(0.25 * 0.07).lost);  // too dark
+  EXPECT_FALSE(loop.next(0.25 * 0.09).lost);
+}
+
+TEST(LaserLight, CharacteristicAndTiltHaveTheirStatedSize) {
+  double peak = 0;
+  for (int i = 0; i <= 2000; ++i) peak = std::max(peak, std::abs(linearity_error_mm(i * 0.1, 200, 0.001)));
+  EXPECT_NEAR(peak, 0.2, 1e-4);
+  EXPECT_EQ(linearity_error_mm(50, 200, 0), 0);
+  const Eigen::Vector3d receiver(1, 0, 0);
+  const auto lean = [&](double deg_x) {
+    return tilt_error_mm({std::sin(rad(deg_x)), 0, -std::cos(rad(deg_x))}, receiver, 200);
+  };
+  EXPECT_NEAR(lean(0), 0, 1e-12);
+  EXPECT_NEAR(lean(5), 0.24, 1e-9);
+  EXPECT_NEAR(lean(15), 0.4, 1e-9);
+  EXPECT_NEAR(lean(-30), -1.0, 1e-9);
+  EXPECT_NEAR(tilt_error_mm({0, std::sin(rad(15)), -std::cos(rad(15))}, receiver, 200), 0, 1e-12);
+}
+
+TEST(Laser, FourSamplesAreSaturatedAfterABrighterSurface) {
+  Scene scene = quiet();
+  scene.laser.beam_spot = false;  // the light jumps from one sample to the next
+  scene.laser.part = Finish::MillScale;
+  scene.laser.table = Finish::Ceramic;
+  const auto clean = sweep(scene, 1195, 1205, 20, 90);
+  scene.laser.noise_mm = 0.05;
+  const auto right_gain = sweep(scene, 1195, 1205, 20, 90);
+  scene.laser.exposure_loop = true;
+  const auto late_gain = sweep(scene, 1195, 1205, 20, 90);
+  ASSERT_EQ(clean.size(), late_gain.size());
+  int saturated = 0, judged = 0;
+  for (std::size_t i = 8; i < clean.size(); ++i) {  // the first samples set the gain
+    ASSERT_EQ(late_gain[i].reading.code, 0U);
+    const double plain = right_gain[i].reading.distance_mm - clean[i].reading.distance_mm;
+    if (std::abs(plain) < 1e-3) continue;
+    const double factor = (late_gain[i].reading.distance_mm - clean[i].reading.distance_mm) / plain;
+    ++judged;
+    if (std::abs(factor - 5) < 0.1) {
+      ++saturated;
+      EXPECT_NEAR(clean[i].x_mm, 1200, 0.15);
+    } else {
+      EXPECT_NEAR(factor, 1, 0.1) << clean[i].x_mm;
+    }
+  }
+  EXPECT_GT(judged, 400);
+  EXPECT_GE(saturated, 3);  // one may be hidden by a noise close to zero
+  EXPECT_LE(saturated, 4);
+}
+
+TEST(Laser, TheBrighterSideTakesMoreOfTheEdge) {
+  // The peak changes sides where both hold as much light: at the quantile of a Gaussian spot of sigma D / 4.
+  Scene scene = quiet();
+  scene.laser.part = Finish::GroundSteel;
+  scene.laser.table = Finish::Ceramic;  // 2.9 times as bright: 0.654 sigma into the bar
+  EXPECT_NEAR(crossing(sweep(scene, 780, 820, 20, 90), 120) - 800, 0.654 * 1.1 / 4, 0.06);
+  EXPECT_NEAR(crossing(sweep(scene, 1180, 1220, 20, 90), 120) - 1200, -0.654 * 1.1 / 4, 0.06);
+  std::swap(scene.laser.part, scene.laser.table);
+  EXPECT_NEAR(crossing(sweep(scene, 780, 820, 20, 90), 120) - 800, -0.654 * 1.1 / 4, 0.06);
+}
+
+TEST(Laser, CharacteristicShiftsTheReading) {
+  Scene scene = quiet();
+  scene.laser.linearity_share = 0.001;
+  // 50 of 200 mm, where the characteristic has its peak.
+  for (const Sample& sample : sweep(scene, 600, 602, 20, 90, 100, 500 + 130 + 50))
+    EXPECT_NEAR(sample.reading.distance_mm, 50.2, 1e-4);
+}
+
+TEST(Laser, LightByWayOfASideReadsTooFarAndOnlyThere) {
+  Scene scene = quiet();
+  scene.laser.secondary_share = 0.25;
+  int far = 0, near_edge = 0;
+  for (const Sample& sample : sweep(scene, 700, 799.9, 20, 90)) {
+    ASSERT_EQ(sample.reading.code, 0U);
+    const double beyond = sample.reading.distance_mm - 140;
+    if (beyond > 0.5) {
+      ++far;
+      EXPECT_LE(beyond, 8.001);
+      EXPECT_GT(sample.x_mm, 790) << "far from any member";
+    }
+    near_edge += sample.x_mm > 799.3;
+  }
+  EXPECT_GT(far, near_edge / 8);
 }
 
 }  // namespace weldcell::sim
