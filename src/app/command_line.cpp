@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "weldcell/files/schema.hpp"
+
 namespace weldcell::app {
 
 CommandLine::CommandLine(Arguments arguments, std::string usage, std::vector<std::string> valued,
@@ -31,7 +33,11 @@ CommandLine::CommandLine(Arguments arguments, std::string usage, std::vector<std
       }
       values_.emplace(argument.substr(2), arguments[++i]);
     } else {
-      exit_code_ = refuse("unknown option '" + argument + "'");
+      std::vector<std::string> known = valued;
+      known.insert(known.end(), flags.begin(), flags.end());
+      const std::string near = files::nearest_word(argument.substr(2), known);
+      exit_code_ = refuse("unknown option '" + argument + "'" +
+                          (near.empty() ? "" : ": did you mean '--" + near + "'?"));
       return;
     }
   }

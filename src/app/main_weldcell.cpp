@@ -2,8 +2,11 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <string>
+#include <vector>
 
 #include "app/commands.hpp"
+#include "weldcell/files/schema.hpp"
 
 namespace {
 
@@ -71,6 +74,13 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "weldcell %s: %s\n", argv[1], fault.what());
     return 3;
   }
-  std::fprintf(stderr, "weldcell: unknown command '%s'\n\n", argv[1]);
-  return usage(stderr);
+  std::vector<std::string> known;
+  for (const Command& command : kCommands) known.emplace_back(command.name);
+  const std::string near = weldcell::files::nearest_word(argv[1], known);
+  if (near.empty()) {
+    std::fprintf(stderr, "weldcell: unknown command '%s'\n\n", argv[1]);
+    return usage(stderr);
+  }
+  std::fprintf(stderr, "weldcell: unknown command '%s': did you mean '%s'?\n", argv[1], near.c_str());
+  return 2;
 }
