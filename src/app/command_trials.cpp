@@ -147,7 +147,7 @@ int command_trials(Arguments arguments) {
   trials.job.workpiece = std::get<JobBundle>(bundle).workpiece;
   trials.job.order.execute_weld = line.has("weld");
   trials.job.order.guidance = false;
-  const auto resident = read_file(shared_file("rapid/WeldcellEgm.mod"));
+  const auto resident = read_shared_file("rapid/WeldcellEgm.mod");
   if (!resident.ok()) return line.refuse(resident.error().text());
   trials.job.resident_module = *resident;
 

@@ -59,9 +59,9 @@ std::string arm_text(const files::CellConfig& config) {
 
 /// WeldcellEgm for RobotWare 6, and for 7 where it differs.
 Result<ResidentModules> resident_modules() {
-  const auto mod = read_file(shared_file("rapid/WeldcellEgm.mod"));
+  const auto mod = read_shared_file("rapid/WeldcellEgm.mod");
   if (!mod.ok()) return mod.error();
-  const auto modx = read_file(shared_file("rapid/WeldcellEgm.modx"));
+  const auto modx = read_shared_file("rapid/WeldcellEgm.modx");
   return ResidentModules{*mod, modx.ok() ? *modx : *mod};
 }
 

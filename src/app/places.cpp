@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <unistd.h>
+#include <array>
 
 #include <cerrno>
 #include <cstring>
@@ -21,10 +22,18 @@ std::string program_dir() {
 
 std::string cad_program() { return program_dir() + "/weldcell-cad"; }
 
-std::string shared_file(const std::string& relative) {
+namespace {
+
+std::array<fs::path, 3> shared_places() {
   const fs::path bin = program_dir();
-  for (const fs::path& root :
-       {bin / "../../../config", bin / "../share/weldcell", fs::path("/usr/share/weldcell")}) {
+  return {(bin / "../../../config").lexically_normal(), (bin / "../share/weldcell").lexically_normal(),
+          "/usr/share/weldcell"};
+}
+
+}  // namespace
+
+std::string shared_file(const std::string& relative) {
+  for (const fs::path& root : shared_places()) {
     std::error_code error;
     const fs::path candidate = root / relative;
     if (fs::exists(candidate, error)) return fs::weakly_canonical(candidate, error).string();
@@ -39,6 +48,15 @@ Result<std::string> read_file(const std::string& path) {
     return Error{"file.read", path, std::strerror(errno), "check that the file is there and readable"};
   }
   return text.str();
+}
+
+Result<std::string> read_shared_file(const std::string& relative) {
+  const std::string path = shared_file(relative);
+  if (!path.empty()) return read_file(path);
+  std::string places;
+  for (const fs::path& root : shared_places()) places += (places.empty() ? "" : ", ") + root.string();
+  return Error{"file.shared", relative, "is in none of " + places,
+               "install weldcell whole, or run it from its build folder"};
 }
 
 Status write_file_durably(const std::string& path, const std::string& text) {

@@ -17,6 +17,8 @@ std::string cad_program();
 /// when absent.
 std::string shared_file(const std::string& relative);
 Result<std::string> read_file(const std::string& path);
+/// The text of a file below config/, looked for as above; the error names the file and the places.
+Result<std::string> read_shared_file(const std::string& relative);
 /// Writes beside the path, syncs and renames, so that the file is never half.
 Status write_file_durably(const std::string& path, const std::string& text);
 
