@@ -12,6 +12,7 @@
 #include "app/command_line.hpp"
 #include "app/job_bundle.hpp"
 #include "app/places.hpp"
+#include "app/resident_modules.hpp"
 #include "weldcell/app/virtual_cell.hpp"
 #include "weldcell/base/units.hpp"
 #include "weldcell/files/edge_file.hpp"
@@ -147,9 +148,9 @@ int command_trials(Arguments arguments) {
   trials.job.workpiece = std::get<JobBundle>(bundle).workpiece;
   trials.job.order.execute_weld = line.has("weld");
   trials.job.order.guidance = false;
-  const auto resident = read_shared_file("rapid/WeldcellEgm.mod");
+  const auto resident = resident_modules(trials.config.setup);
   if (!resident.ok()) return line.refuse(resident.error().text());
-  trials.job.resident_module = *resident;
+  trials.job.resident_module = resident->mod;
 
   const std::vector<VirtualOutcome> outcomes = run(trials, std::get<sim::Scene>(first));
 

@@ -18,6 +18,7 @@ int command_review(Arguments arguments);
 int command_dump(Arguments arguments);
 int command_calibrate(Arguments arguments);
 int command_arm(Arguments arguments);
+int command_rapid(Arguments arguments);
 int command_submit(Arguments arguments);
 int command_status(Arguments arguments);
 int command_jobs(Arguments arguments);

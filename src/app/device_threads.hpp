@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "app/resident_modules.hpp"
 #include "app/wiring.hpp"
 #include "weldcell/adapters/egm_udp.hpp"
 #include "weldcell/adapters/modbus_server.hpp"
@@ -14,10 +15,6 @@ namespace weldcell::app {
 void run_egm(Wiring& wiring, adapters::EgmSocket& socket);
 /// Keeps the laser connected and its bytes flowing to the cell while a scan wants them.
 void run_laser(Wiring& wiring);
-/// The resident RAPID module's text, by generation of RWS: RobotWare 6 (.mod) and 7 (.modx).
-struct ResidentModules {
-  std::string mod, modx;
-};
 /// Robot requests over RWS, one at a time; beside them a subscription tells what the controller does.
 void run_rws(Wiring& wiring, const std::string& password, const ResidentModules& resident);
 /// Tells the cell that a device came or went.

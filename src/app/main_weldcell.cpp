@@ -31,6 +31,7 @@ constexpr Command kCommands[] = {
     {"calibrate", weldcell::app::command_calibrate,
      "latency from passes to and fro: residuals, covariance, cell file"},
     {"arm", weldcell::app::command_arm, "joints <-> tool0 poses of an arm model, as CSV"},
+    {"rapid", weldcell::app::command_rapid, "RAPID modules and configuration rows for the robot controller"},
     {"submit", weldcell::app::command_submit, "drop a job into the spool"},
     {"status", weldcell::app::command_status, "what the daemon does now"},
     {"jobs", weldcell::app::command_jobs, "the jobs in the spool"},

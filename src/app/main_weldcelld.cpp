@@ -57,14 +57,6 @@ std::string arm_text(const files::CellConfig& config) {
   return text.ok() ? *text : std::string{};
 }
 
-/// WeldcellEgm for RobotWare 6, and for 7 where it differs.
-Result<ResidentModules> resident_modules() {
-  const auto mod = read_shared_file("rapid/WeldcellEgm.mod");
-  if (!mod.ok()) return mod.error();
-  const auto modx = read_shared_file("rapid/WeldcellEgm.modx");
-  return ResidentModules{*mod, modx.ok() ? *modx : *mod};
-}
-
 Status write_ports(const std::string& path, const Wiring& wiring) {
   if (path.empty()) return Done{};
   return write_file_durably(path, fmt::format("{{\"egm\": {}, \"modbus\": {}}}\n", wiring.egm_port.load(),
@@ -83,8 +75,8 @@ void come_to_rest(Wiring& wiring, const SpoolKeeper&) {
 int serve(const files::CellConfig& config, const std::string& ports_file) {
   const auto password = password_of(config);
   if (!password.ok()) return refuse(password.error().text());
-  const auto resident = resident_modules();
-  if (!resident.ok()) return refuse("the resident RAPID module is missing: " + resident.error().text());
+  const auto resident = resident_modules(config.setup);
+  if (!resident.ok()) return refuse("the resident RAPID module: " + resident.error().text());
 
   std::error_code error;
   std::filesystem::create_directories(config.state_dir, error);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "weldcell/base/units.hpp"
+#include "weldcell/weld/resident.hpp"
 
 namespace weldcell::app {
 
@@ -12,7 +13,6 @@ namespace {
 
 constexpr Nanoseconds kPollInterval = 150 * kMillisecond, kSlowPoll = kSecond;
 constexpr double kHaltTimeout = 5, kMoveTimeout = 60;
-constexpr const char* kResident = "WeldcellEgm";
 constexpr const char* kJobModule = "WeldcellJob";
 
 std::string jointtarget(const kinematics::Joints& q) {
@@ -95,9 +95,9 @@ std::optional<job::RobotReply> RobotRunner::await_end(HostTime now) {
     return answer(
         Error{"robot.move", "RAPID", "the move did not end within 60 s", "look at the FlexPendant"});
   }
-  const auto state = rws_->read_symbol(task_, kResident, "nWeldcellState");
+  const auto state = rws_->read_symbol(task_, weld::kResidentModule, weld::kStateSymbol);
   if (!state.ok()) return answer(state.error());
-  if (*state == "2") return answer(Done{});
+  if (*state == std::to_string(static_cast<int>(weld::ResidentState::There))) return answer(Done{});
   return answer(Error{"robot.move", "RAPID", "the move stopped before its end: " + last_event_text(),
                       "clear the cause, arm and resume"});
 }
@@ -132,10 +132,10 @@ Status RobotRunner::act() {
   if (auto s = make_ready(); !s.ok()) return s;
   switch (request_.task) {
     case RobotTask::Move:
-      return run_routine(kResident, "WeldcellMove", kResident, "jWeldcellStart",
+      return run_routine(weld::kResidentModule, weld::kMoveRoutine, weld::kResidentModule, weld::kStartSymbol,
                          jointtarget(request_.joints));
     case RobotTask::OpenScan:
-      return run_routine(kResident, "WeldcellScan", kResident, "jWeldcellStart",
+      return run_routine(weld::kResidentModule, weld::kScanRoutine, weld::kResidentModule, weld::kStartSymbol,
                          jointtarget(request_.joints));
     case RobotTask::Weld:
       return run_routine(kJobModule, "WeldcellWeld", kJobModule, "nSeamsToSkip",
@@ -169,8 +169,8 @@ Status RobotRunner::make_resident() {
   if (resident_checked_) return Done{};
   const auto loaded = rws_->modules(task_);
   if (!loaded.ok()) return loaded.error();
-  const bool there = std::find(loaded->begin(), loaded->end(), kResident) != loaded->end();
-  const std::string path = rws_->module_path(kResident);
+  const bool there = std::find(loaded->begin(), loaded->end(), weld::kResidentModule) != loaded->end();
+  const std::string path = rws_->module_path(weld::kResidentModule);
   const auto text = rws_->download_file(path);
   if (!there || !text.ok() || *text != resident_) {
     if (auto s = rws_->upload_file(path, resident_); !s.ok()) return s;

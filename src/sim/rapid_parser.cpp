@@ -79,13 +79,13 @@ class Parser {
       module_->data.back().local = local;
     } else if (take_word("record")) {
       record();
-    } else if (is_word("proc")) {
+    } else if (any_word({"proc", "trap"})) {
       Routine routine = this->routine();
       routine.local = local;
       const std::string name = routine.name;
       if (!module_->routines.emplace(name, std::move(routine)).second)
         fail("routine '" + name + "' declared twice");
-    } else if (any_word({"func", "trap"})) {
+    } else if (is_word("func")) {
       fail(here().text + " is not supported by this simulator");
     } else {
       fail("declaration or PROC expected, not " + shown());
@@ -138,11 +138,13 @@ class Parser {
   Routine routine() {
     Routine out;
     out.line = here().line;
+    out.trap = is_word("trap");
+    const char* const end = out.trap ? "endtrap" : "endproc";
     next();
     std::tie(out.name, out.display) = identifier("routine name");
     out.module = module_->name;
-    expect("(");
-    if (!take(")")) {
+    if (!out.trap) expect("(");
+    if (!out.trap && !take(")")) {
       do {
         if (is("\\") || any_word({"inout", "var", "pers"}))
           fail("only plain parameters are supported by this simulator");
@@ -152,13 +154,13 @@ class Parser {
       expect(")");
     }
     while (any_word({"const", "pers", "var"})) out.data.push_back(declaration());
-    out.body = block({"endproc", "error", "undo", "backward"});
+    out.body = block({end, "error", "undo", "backward"});
     if (take_word("error")) {
       out.has_error_handler = true;
-      out.error_handler = block({"endproc", "undo", "backward"});
+      out.error_handler = block({end, "undo", "backward"});
     }
     if (any_word({"undo", "backward"})) fail(here().text + " is not supported by this simulator");
-    expect_word("endproc");
+    expect_word(end);
     return out;
   }
 
@@ -167,7 +169,7 @@ class Parser {
     Block out;
     if (++depth_ > 50) fail("nested too deep");
     while (!any_word(ends)) {
-      if (here().kind == Token::Kind::End || is_word("endmodule") || is_word("endproc")) {
+      if (here().kind == Token::Kind::End || any_word({"endmodule", "endproc", "endtrap"})) {
         fail(std::string(*ends.begin()) + " expected, not " + shown());
       }
       if (take(";")) continue;
@@ -223,7 +225,8 @@ class Parser {
       expect(";");
       return out;
     }
-    if (any_word({"goto", "connect"})) fail(here().text + " is not supported by this simulator");
+    if (is_word("connect")) return connect();
+    if (is_word("goto")) fail(here().text + " is not supported by this simulator");
     const std::size_t begin = at_;
     out.name = identifier("instruction").first;
     if (is(":=") || is(".") || is("{")) {
@@ -237,6 +240,19 @@ class Parser {
     } else {
       out.arguments = arguments(";");
     }
+    expect(";");
+    return out;
+  }
+
+  /// CONNECT number WITH trap: an instruction whose second argument is the trap's name.
+  Statement connect() {
+    Statement out = make(Statement::Kind::Call);
+    out.name = identifier("CONNECT").first;
+    out.arguments.push_back({"", reference()});
+    expect_word("with");
+    auto trap = node(Expression::Kind::Literal);
+    trap->literal = Value::of(identifier("trap name").first);
+    out.arguments.push_back({"", std::move(trap)});
     expect(";");
     return out;
   }

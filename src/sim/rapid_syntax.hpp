@@ -80,6 +80,7 @@ struct Routine {
   Block body, error_handler;
   bool has_error_handler = false;
   bool local = false;
+  bool trap = false;  ///< TRAP: run by an interrupt only
   int line = 0;
 };
 

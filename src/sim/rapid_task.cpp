@@ -1,5 +1,7 @@
 #include "sim/rapid_task.hpp"
 
+#include <utility>
+
 namespace weldcell::sim::rapid {
 
 namespace {
@@ -28,7 +30,8 @@ std::size_t Call::positional() const {
 
 bool Task::set_pointer(const std::string& module, const std::string& routine) {
   const Routine* found = memory_.routine(module, routine);
-  if (!found || (!module.empty() && found->module != module) || !found->parameters.empty()) return false;
+  if (!found || found->trap || (!module.empty() && found->module != module) || !found->parameters.empty())
+    return false;
   clear_pointer();
   entry_module_ = found->module;
   entry_routine_ = routine;
@@ -38,6 +41,7 @@ bool Task::set_pointer(const std::string& module, const std::string& routine) {
 void Task::clear_pointer() {
   frames_.clear();
   waits_.clear();
+  interrupts_.clear();
   entry_module_.clear();
   entry_routine_.clear();
 }
@@ -106,7 +110,10 @@ void Task::advance() {
 }
 
 void Task::leave() {
+  const bool trap = frames_.back().routine->trap;
+  if (trap) waits_ = std::move(frames_.back().interrupted);
   frames_.pop_back();
+  if (trap && !frames_.empty()) return;  // the statement that was interrupted goes on
   if (!frames_.empty()) {
     advance();
     return;
@@ -122,8 +129,10 @@ void Task::finish(int event, const std::string& what, bool error) {
 }
 
 void Task::run(int budget) {
+  bool looked = false;
   while (running_ && budget-- > 0) {
     try {
+      if (!std::exchange(looked, true)) take_interrupts();
       while (!waits_.empty()) {
         if (!waits_.front()()) return;
         waits_.pop_front();
@@ -240,7 +249,7 @@ std::vector<ActualArgument> Task::evaluate(const std::vector<Argument>& argument
 
 void Task::call(const Statement& statement, const std::string& name) {
   const Routine* routine = memory_.routine(frames_.back().routine->module, name);
-  if (routine) {
+  if (routine && !routine->trap) {
     push(*routine, evaluate(statement.arguments, scope()));
     return;
   }
@@ -249,6 +258,7 @@ void Task::call(const Statement& statement, const std::string& name) {
   call.line = statement.line;
   call.routine = frames_.back().routine->display;
   call.arguments = evaluate(statement.arguments, scope());
+  if (interrupt_instruction(call)) return advance();
   if (!machine_.begin(call, waits_)) {
     throw RapidError{kErrReferenceUnknown, "routine or instruction '" + name + "' is not known", 40165};
   }

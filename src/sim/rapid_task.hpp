@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -84,6 +85,13 @@ class Task {
     DataMap locals;
     std::vector<Cursor> cursors, failed_at;
     bool handling = false;
+    std::deque<Machine::Wait> interrupted;  ///< of a trap: what was being waited for when it came
+  };
+  /// CONNECT and IPers: which trap runs when a persistent changes.
+  struct Interrupt {
+    std::string trap;  ///< lower case
+    std::string module, persistent;
+    Value seen;
   };
 
   bool enter();
@@ -98,6 +106,8 @@ class Task {
   void raise(const RapidError& error);
   void resume_after_error(bool retry);
   void finish(int event, const std::string& what, bool error);
+  bool interrupt_instruction(const Call& call);
+  void take_interrupts();
   std::vector<ActualArgument> evaluate(const std::vector<Argument>& arguments, const Scope& scope);
   bool truth(const Expression& expression, const Scope& scope);
   void assign(const Statement& statement, const Scope& scope);
@@ -108,6 +118,8 @@ class Task {
   std::string entry_module_, entry_routine_;
   std::vector<Frame> frames_;
   std::deque<Machine::Wait> waits_;
+  std::map<double, Interrupt> interrupts_;  ///< by the number in the intnum
+  double last_interrupt_ = 0;
   bool running_ = false;
   bool forever_ = false;
 };

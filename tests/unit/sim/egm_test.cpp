@@ -1,7 +1,7 @@
 // EGM: the control law against its documented errors, the frame field by field, time-out and convergence.
 #include <cmath>
 
-#include "egm.pb.h"
+#include "egm_messages.hpp"
 #include "fixture.hpp"
 #include "sim/egm_channel.hpp"
 
@@ -10,27 +10,6 @@ namespace weldcell::sim {
 namespace {
 
 using kinematics::Joints;
-
-std::vector<std::byte> sensor(const Joints& joints_deg, const Joints& speed_deg_s,
-                              bool with_position = true) {
-  abb::egm::EgmSensor message;
-  message.mutable_header()->set_seqno(1);
-  message.mutable_header()->set_tm(1);
-  message.mutable_header()->set_mtype(abb::egm::EgmHeader::MSGTYPE_CORRECTION);
-  for (std::size_t i = 0; i < 6; ++i) {
-    if (with_position) message.mutable_planned()->mutable_joints()->add_joints(joints_deg[i]);
-    message.mutable_speedref()->mutable_joints()->add_joints(speed_deg_s[i]);
-  }
-  std::vector<std::byte> out(message.ByteSizeLong());
-  message.SerializeToArray(out.data(), static_cast<int>(out.size()));
-  return out;
-}
-
-abb::egm::EgmRobot robot(const std::vector<std::byte>& bytes) {
-  abb::egm::EgmRobot out;
-  EXPECT_TRUE(out.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())));
-  return out;
-}
 
 std::string guided(const std::string& options = "\\CommTimeout:=0.5",
                    const std::string& run = "\\CondTime:=1E+05", const std::string& minmax = "-1E-09,1E-09") {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "weldcell/base/units.hpp"
@@ -118,6 +119,27 @@ class Bench {
 
  public:
   Controller controller;
+};
+
+inline constexpr const char* kHal = "application/hal+json;v=2.0";
+inline constexpr const char* kXhtml = "application/xhtml+xml;v=2.0";
+inline constexpr const char* kForm = "application/x-www-form-urlencoded;v=2.0";
+
+inline Scene omnicore() {
+  Scene scene = test_scene();
+  scene.controller.rws_generation = 2;
+  return scene;
+}
+
+/// The same controller as RWS 2.0 shows it.
+struct Two : Bench {
+  explicit Two(const Scene& scene = omnicore()) : Bench(scene) {}
+  ports::HttpReply ask(const std::string& method, const std::string& path, const std::string& body = "",
+                       int session = 1) {
+    return controller.handle_rws(
+        {method, path, body, method == "GET" ? "" : kForm, method == "GET" ? kHal : kXhtml}, session);
+  }
+  nlohmann::json json(const std::string& path) { return nlohmann::json::parse(ask("GET", path).body); }
 };
 
 }  // namespace weldcell::sim

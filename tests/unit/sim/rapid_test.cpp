@@ -136,4 +136,54 @@ TEST(RapidProgram, WaitTimeIsProgramTime) {
   EXPECT_EQ(bench.value("T", "n"), "1");
 }
 
+TEST(RapidProgram, TrapRunsWhileAnInstructionWaitsWhichThenGoesOn) {
+  Bench bench;
+  bench.run_program(R"(MODULE T
+  PERS bool bAsk:=FALSE;
+  PERS num nTraps:=0;
+  PERS num n:=0;
+  VAR intnum iAsk;
+  PROC main()
+    IDelete iAsk;
+    CONNECT iAsk WITH Asked;
+    IPers bAsk,iAsk;
+    WaitTime 0.4;
+    n:=1;
+    IDelete iAsk;
+    WaitTime 0.4;
+    n:=2;
+  ENDPROC
+  TRAP Asked
+    WaitTime 0.05;
+    INCR nTraps;
+  ENDTRAP
+ENDMODULE)",
+                    "T", "main");
+  const auto ask = [&bench](const char* value) {
+    EXPECT_EQ(bench.rws("POST", "/rw/rapid/symbol/data/RAPID/T_ROB1/T/bAsk?action=set", value).status, 204);
+  };
+  bench.step(25);
+  EXPECT_EQ(bench.value("T", "nTraps"), "0");
+  ask("value=TRUE");
+  bench.step(20);
+  EXPECT_EQ(bench.value("T", "nTraps"), "1");
+  EXPECT_EQ(bench.value("T", "n"), "0");
+  bench.step(70);
+  EXPECT_EQ(bench.value("T", "n"), "1") << "the wait that was interrupted ended in its time";
+  ask("value=FALSE");
+  ASSERT_TRUE(bench.finish(2)) << bench.last_events();
+  EXPECT_EQ(bench.value("T", "nTraps"), "1") << "IDelete ended it";
+  EXPECT_EQ(bench.value("T", "n"), "2");
+}
+
+TEST(RapidProgram, TrapIsNoRoutineToCallOrToPointTo) {
+  Bench bench;
+  bench.run_program("MODULE T\nPROC main()\n Asked;\nENDPROC\nTRAP Asked\nENDTRAP\nENDMODULE", "T", "main");
+  ASSERT_TRUE(bench.finish(1));
+  EXPECT_EQ(bench.controller.events().back().type, 3);
+  EXPECT_EQ(
+      bench.rws("POST", "/rw/rapid/tasks/T_ROB1/pcp?action=set-pp-routine", "module=T&routine=Asked").status,
+      400);
+}
+
 }  // namespace weldcell::sim

@@ -7,28 +7,9 @@
 namespace weldcell::sim {
 namespace {
 
-constexpr const char* kHal = "application/hal+json;v=2.0";
-constexpr const char* kXhtml = "application/xhtml+xml;v=2.0";
-constexpr const char* kForm = "application/x-www-form-urlencoded;v=2.0";
 constexpr const char* kModule =
     "MODULE T\n PERS num n:=1;\n CONST num c:=2;\n PROC main()\n  WaitTime 1;\n ENDPROC\n PROC other()\n "
     "ENDPROC\nENDMODULE";
-
-Scene omnicore() {
-  Scene scene = test_scene();
-  scene.controller.rws_generation = 2;
-  return scene;
-}
-
-struct Two : Bench {
-  explicit Two(const Scene& scene = omnicore()) : Bench(scene) {}
-  ports::HttpReply ask(const std::string& method, const std::string& path, const std::string& body = "",
-                       int session = 1) {
-    return controller.handle_rws(
-        {method, path, body, method == "GET" ? "" : kForm, method == "GET" ? kHal : kXhtml}, session);
-  }
-  nlohmann::json json(const std::string& path) { return nlohmann::json::parse(ask("GET", path).body); }
-};
 
 TEST(RwsTwo, WantsItsVersionInEveryType) {
   Two bench;

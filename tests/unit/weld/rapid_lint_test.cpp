@@ -124,7 +124,7 @@ class Linter {
     check_identifiers(code);
     std::smatch m;
     static const std::regex kModule("MODULE ([A-Za-z][A-Za-z0-9_]*)"),
-        kProc("PROC ([A-Za-z][A-Za-z0-9_]*)\\(\\)"),
+        kProc("PROC ([A-Za-z][A-Za-z0-9_]*)\\(\\)"), kTrap("TRAP ([A-Za-z][A-Za-z0-9_]*)"),
         kData("(PERS|CONST|VAR) ([a-z_]+) ([A-Za-z][A-Za-z0-9_]*)(:=(.*))?;"), kIf("IF .* THEN");
     if (std::regex_match(code, m, kModule)) {
       out_.name = m[1];
@@ -132,13 +132,16 @@ class Linter {
       open("ENDPROC");
       routine_ = m[1];
       out_.routines.push_back(m[1]);
+    } else if (std::regex_match(code, m, kTrap)) {
+      open("ENDTRAP");
+      routine_ = m[1];
     } else if (std::regex_match(code, m, kData)) {
       data(m[1], m[2], m[3], m[5]);
     } else if (std::regex_match(code, kIf)) {
       open("ENDIF");
     } else if (code == "ERROR") {
       if (blocks_.empty() || blocks_.back() != "ENDPROC") fault("ERROR outside a routine");
-    } else if (code == "ENDPROC" || code == "ENDIF") {
+    } else if (code == "ENDPROC" || code == "ENDTRAP" || code == "ENDIF") {
       if (blocks_.empty() || blocks_.back() != code) return fault(code + " without its beginning");
       blocks_.pop_back();
     } else if (code == "ENDMODULE") {
