@@ -28,5 +28,6 @@ int command_hold(Arguments arguments);
 int command_release(Arguments arguments);
 int command_cancel(Arguments arguments);
 int command_plc_check(Arguments arguments);
+int command_doctor(Arguments arguments);
 
 }  // namespace weldcell::app
