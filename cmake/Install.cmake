@@ -1,4 +1,4 @@
-# cmake --install: programs, configuration samples, systemd unit with its user and spool directory.
+# cmake --install: programs, configuration samples, systemd unit with its user and spool directory; manual pages in Manual.cmake.
 include(GNUInstallDirs)
 foreach(PROGRAM weldcelld weldcell weldcell-sim weldcell-cad)
   if(TARGET ${PROGRAM})
@@ -6,6 +6,6 @@ foreach(PROGRAM weldcelld weldcell weldcell-sim weldcell-cad)
   endif()
 endforeach()
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/weldcell)
-install(FILES ${CMAKE_SOURCE_DIR}/systemd/weldcelld.service DESTINATION lib/systemd/system OPTIONAL)
+install(FILES ${CMAKE_SOURCE_DIR}/systemd/weldcelld.service DESTINATION lib/systemd/system)
 install(FILES ${CMAKE_SOURCE_DIR}/systemd/sysusers.d/weldcell.conf DESTINATION lib/sysusers.d)
 install(FILES ${CMAKE_SOURCE_DIR}/systemd/tmpfiles.d/weldcell.conf DESTINATION lib/tmpfiles.d)

@@ -35,17 +35,30 @@ constexpr const char* kUsage =
     "job's state\n"
     "machine as a Graphviz graph; --ports-file tells the ports that were taken, as JSON.\n";
 
+/// The cell file or what it names is wrong: starting again would not mend it.
 int refuse(const std::string& text) {
   std::fprintf(stderr, "weldcelld: %s\n", text.c_str());
   return EX_CONFIG;
 }
 
-/// The controller's password: credential, file, or none.
+/// The system does not give what is wanted now, such as an address that a slow network card gets later: the
+/// service manager tries again.
+int fail(const std::string& text) {
+  std::fprintf(stderr, "weldcelld: %s\n", text.c_str());
+  return 3;
+}
+
+/// The controller's password: credential, file, or none. The unit hands over an empty credential where
+/// /etc/weldcell/rws-password is missing.
 Result<std::string> password_of(const files::CellConfig& config) {
   auto credential = adapters::credential("rws-password");
-  if (credential.ok() || config.rws_password_file.empty())
-    return credential.ok() ? credential : Result<std::string>(std::string{});
-  return adapters::secret_file(config.rws_password_file);
+  if (!credential.ok() && credential.error().code != "credential.absent") return credential;
+  if (credential.ok() && !credential->empty()) return credential;
+  if (!config.rws_password_file.empty()) return adapters::secret_file(config.rws_password_file);
+  spdlog::warn(
+      "no password for the robot controller: its credential rws-password is missing or empty; write "
+      "/etc/weldcell/rws-password (mode 0600), then systemctl restart weldcelld");
+  return std::string{};
 }
 
 /// Text of the arm's data file beside the cell file, for the record; empty when the cell file holds the arm
@@ -85,23 +98,24 @@ int serve(const files::CellConfig& config, const std::string& ports_file) {
 
   const auto wiring = std::make_unique<Wiring>(config);
   auto egm = adapters::EgmSocket::bind(config.egm.host, config.egm.port, config.egm_peer);
-  if (!egm.ok()) return refuse(egm.error().text());
+  if (!egm.ok()) return fail(egm.error().text());
   adapters::ModbusOptions modbus_options;
   modbus_options.host = config.modbus.host;
   modbus_options.port = config.modbus.port;
   modbus_options.allowed_clients = config.modbus_allow;
   modbus_options.max_clients = config.modbus_max_clients;
   auto modbus = adapters::ModbusServer::listen(modbus_options);
-  if (!modbus.ok()) return refuse(modbus.error().text());
+  if (!modbus.ok()) return fail(modbus.error().text());
   wiring->egm_port = egm->port();
   wiring->modbus_port = modbus->port();
   auto control = open_control(*wiring);
-  if (!control.ok()) return refuse(control.error().text());
+  if (!control.ok()) return fail(control.error().text());
   if (const Status told = write_ports(ports_file, *wiring); !told.ok()) return refuse(told.error().text());
 
   CellThread cell(*wiring, arm_text(config));
   auto threads = start_threads(*wiring, cell, *egm, *modbus, *password, *resident);
-  if (!threads.ok()) return refuse(threads.error().text());
+  if (!threads.ok())
+    return threads.error().code == "realtime" ? refuse(threads.error().text()) : fail(threads.error().text());
 
   SpoolKeeper keeper(*wiring, std::move(*spool));
   spdlog::info("weldcelld {} serves cell '{}': EGM {}:{}, Modbus {}:{}, spool {}", WELDCELL_VERSION,
