@@ -42,8 +42,8 @@ Error fault(const char* code, const std::string& peer, const std::string& what, 
 Error connect_fault(const std::string& peer, int reason) {
   if (reason == ECONNREFUSED)
     return fault("laser.refused", peer, "the host is there, but nothing listens on this port",
-                 "switch the sensor's data server on or correct laser.port");
-  return fault("laser.unreachable", peer, std::strerror(reason), "check cable, power and laser.host");
+                 "switch the sensor's data server on or correct the port in laser.address");
+  return fault("laser.unreachable", peer, std::strerror(reason), "check cable, power and laser.address");
 }
 
 }  // namespace
@@ -59,7 +59,7 @@ Result<LaserSocket> LaserSocket::connect(const std::string& host, int port, Nano
   if (port <= 0 || port > 65535 ||
       ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found) != 0)
     return fault("laser.address", out.peer_, "not an IPv4 address and port",
-                 "write the sensor's dotted address and a port from 1 to 65535");
+                 "write laser.address as the sensor's dotted address and a port from 1 to 65535");
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> address(found, &::freeaddrinfo);
 
   out.fd_ = Fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
@@ -71,7 +71,7 @@ Result<LaserSocket> LaserSocket::connect(const std::string& host, int port, Nano
     const Nanoseconds wait = std::max<Nanoseconds>(timeout, 0);
     const std::timespec limit{wait / kSecond, wait % kSecond};
     if (::ppoll(&wanted, 1, &limit, nullptr) <= 0)
-      return fault("laser.timeout", out.peer_, "no answer", "check cable, power and laser.host");
+      return fault("laser.timeout", out.peer_, "no answer", "check cable, power and laser.address");
     int reason = 0;
     socklen_t bytes = sizeof reason;
     ::getsockopt(out.fd_.get(), SOL_SOCKET, SO_ERROR, &reason, &bytes);

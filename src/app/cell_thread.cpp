@@ -46,7 +46,7 @@ bool sets_in_motion(const job::Output& output) {
 CellThread::CellThread(Wiring& wiring, std::string arm_yaml)
     : wiring_(wiring),
       arm_yaml_(std::move(arm_yaml)),
-      cell_(wiring.config.setup, wiring.config.laser_layout, wiring.config.plc_required) {}
+      cell_(wiring.config.setup, wiring.config.laser_format, wiring.config.plc_required) {}
 
 void CellThread::run() {
   while (!wiring_.stopping.load(std::memory_order_relaxed)) {

@@ -135,8 +135,8 @@ Status apply(const std::string& cell_file, const files::CellConfig& config, doub
   const cell::LaserSetup& laser = config.setup.laser;
   const std::string conditions =
       fmt::format("{{date: \"{}\", rate_hz: {:g}, dialect: {}, filter: \"{}\", robot: {}}}",
-                  adapters::utc_text(adapters::unix_ms()), laser.rate_hz, config.laser_dialect,
-                  config.laser_filter, config.setup.arm.name);
+                  adapters::utc_text(adapters::unix_ms()), laser.rate_hz,
+                  wire::to_string(config.laser_format.dialect), config.laser_filter, config.setup.arm.name);
   // The clock maps of a single scan add their own few hundredths of a millisecond.
   const auto text = files::with_keys(config.text, "laser",
                                      {{"latency_ms", fmt::format("{:.4f}", latency_ms)},

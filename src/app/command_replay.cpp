@@ -159,9 +159,9 @@ void dump_poses(const Record& record) {
   }
 }
 
-void dump_ranges(const Record& record, const wire::Meas28Layout& layout) {
+void dump_ranges(const Record& record, const wire::LaserFormat& format) {
   std::puts("arrival_s,counter,timestamp_us,distance_mm,code");
-  wire::Meas28Decoder decoder(layout);
+  wire::LaserDecoder decoder(format);
   for (const RecordedStep& step : record.steps) {
     const auto* laser = std::get_if<job::LaserBytes>(&step.input.body);
     if (laser == nullptr) continue;
@@ -203,7 +203,7 @@ int command_dump(Arguments arguments) {
   const auto outcome = replay(*record, {});
   if (!outcome.ok()) return tell(outcome.error());
   if (topic == "ranges") {
-    dump_ranges(*record, outcome->laser_layout);
+    dump_ranges(*record, outcome->laser_format);
     return 0;
   }
   const auto solution = outcome->cell->solution();

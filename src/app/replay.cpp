@@ -113,8 +113,8 @@ class Replayer {
         compare_(compare),
         setup_(std::make_shared<const cell::CellSetup>(context.config.setup)) {
     outcome_.setup = context.config.setup;
-    outcome_.laser_layout = context.config.laser_layout;
-    outcome_.cell = std::make_unique<job::Cell>(context.config.setup, context.config.laser_layout,
+    outcome_.laser_format = context.config.laser_format;
+    outcome_.cell = std::make_unique<job::Cell>(context.config.setup, context.config.laser_format,
                                                 context.config.plc_required);
     outcome_.cell->recall(memory_from_json(record.header.initial_json));
   }

@@ -31,7 +31,7 @@ class VirtualCell {
       : scene_(scene),
         job_(job),
         setup_(std::make_shared<cell::CellSetup>(config.setup)),
-        cell_(config.setup, config.laser_layout, false),
+        cell_(config.setup, config.laser_format, false),
         session_(config.setup),
         controller_(scene, config.setup.arm),
         laser_(scene),

@@ -9,79 +9,6 @@
 
 namespace weldcell::files {
 
-namespace {
-
-template <typename To, typename From>
-void read_mount_of(Map& map, Transform<To, From>& mount) {
-  const Node* node = map.node("mount", Need::Required);
-  if (node == nullptr) return;
-  Map inner(*node, map.file(), map.dotted("mount"), map.faults());
-  if (node->kind == Node::Kind::Map) read_mount(inner, mount.iso);
-}
-
-void read_frame(Map& map, wire::Meas28Layout& layout) {
-  const Node* list = map.sequence("frame");
-  if (list == nullptr) return;
-  wire::Meas28Layout read{false, false, false, false, false};
-  for (const Node& item : list->items) {
-    if (item.text == "exposure")
-      read.exposure = true;
-    else if (item.text == "counter")
-      read.counter = true;
-    else if (item.text == "timestamp")
-      read.timestamp = true;
-    else if (item.text == "intensity")
-      read.intensity = true;
-    else if (item.text == "status")
-      read.status = true;
-    else
-      map.fault("frame", item.describe() + " is no item of a reading",
-                "any of exposure, counter, timestamp, intensity, status");
-  }
-  layout = read;
-}
-
-void read_latency_conditions(Map& map, CellConfig& config) {
-  const Node* node = map.node("latency_measured");
-  if (node == nullptr) return;
-  Map inner(*node, map.file(), map.dotted("latency_measured"), map.faults());
-  if (node->kind != Node::Kind::Map) return;
-  LatencyConditions out;
-  inner.text("date", out.date, Need::Required);
-  inner.number("rate_hz", out.rate_hz, {50, 70'000}, Need::Required);
-  inner.text("dialect", out.dialect, Need::Required);
-  inner.text("filter", out.filter, Need::Required);
-  inner.text("robot", out.robot, Need::Required);
-  inner.finish();
-  config.latency_measured = out;
-}
-
-}  // namespace
-
-void check_latency_conditions(const Node& document, const CellConfig& config, const std::string& file,
-                              Faults& faults) {
-  const cell::LaserSetup& laser = config.setup.laser;
-  if (!config.latency_measured) return;
-  const LatencyConditions& then = *config.latency_measured;
-  const Node* section = document.find("laser");
-  const Node* measured = section == nullptr ? nullptr : section->find("latency_measured");
-  const auto differs = [&](const char* key, const std::string& was, const std::string& is) {
-    int line = measured == nullptr ? 0 : measured->line;
-    if (measured != nullptr) {
-      for (const Node::Key& k : measured->keys) line = k.text == key ? k.line : line;
-    }
-    faults.push_back({file, line, std::string("laser.latency_measured.") + key,
-                      fmt::format("the latency was measured at '{}', the cell runs '{}'", was, is),
-                      "measure it again (weldcell calibrate latency), or remove latency_measured and widen "
-                      "latency_sigma_ms"});
-  };
-  if (std::abs(then.rate_hz - laser.rate_hz) > 1e-6 * laser.rate_hz)
-    differs("rate_hz", fmt::format("{:g}", then.rate_hz), fmt::format("{:g}", laser.rate_hz));
-  if (then.dialect != config.laser_dialect) differs("dialect", then.dialect, config.laser_dialect);
-  if (then.filter != config.laser_filter) differs("filter", then.filter, config.laser_filter);
-  if (then.robot != config.setup.arm.name) differs("robot", then.robot, config.setup.arm.name);
-}
-
 bool read_endpoint(Map& map, const char* key, Endpoint& endpoint, bool zero_is_free) {
   std::string text;
   if (!map.text(key, text)) return false;
@@ -176,35 +103,6 @@ void read_rws(Map& map, CellConfig& config) {
               "put it alone into a file with mode 0600 and write password_file: <path>");
   }
   map.finish();
-}
-
-void read_laser(Map& map, CellConfig& config) {
-  const std::size_t faults_before = map.faults().size();
-  cell::LaserSetup& laser = config.setup.laser;
-  static constexpr Choice<int> kDialects[] = {{"meas28", 0}};
-  int dialect = 0;
-  if (map.choice("dialect", dialect, kDialects)) config.laser_dialect = kDialects[dialect].word;
-  read_endpoint(map, "address", config.laser, true);
-  read_frame(map, config.laser_layout);
-  read_mount_of(map, laser.T_flange_laser);
-  map.number("start_of_range_mm", laser.start_of_range_mm, {0, 5000});
-  map.number("range_mm", laser.range_mm, {1, 5000});
-  map.number("rate_hz", laser.rate_hz, {50, 70'000});
-  map.number("latency_ms", laser.latency_ms, {-100, 500});
-  map.number("latency_sigma_ms", laser.latency_sigma_ms, {0, 100});
-  map.text("filter", config.laser_filter);
-  read_latency_conditions(map, config);
-  map.number("spot_mm", laser.spot_mm, {0.001, 20});
-  map.degrees("triangulation_deg", laser.triangulation_rad, {1, 80});
-  map.number("noise_mm", laser.noise_mm, {0, 10});
-  map.number("standoff_mm", laser.standoff_mm, {1, 10'000});
-  map.finish();
-  if (map.faults().size() != faults_before) return;
-  const double near_mm = laser.start_of_range_mm, far_mm = laser.start_of_range_mm + laser.range_mm;
-  if (laser.standoff_mm <= near_mm || laser.standoff_mm >= far_mm) {
-    map.fault("standoff_mm", fmt::format("{:g} is outside the measuring range", laser.standoff_mm),
-              fmt::format("between {:g} and {:g}, the start of the range and its end", near_mm, far_mm));
-  }
 }
 
 void read_projector(Map& map, CellConfig& config) {

@@ -22,6 +22,15 @@ void read_plc(Map& map, CellConfig& config);
 void check_latency_conditions(const Node& document, const CellConfig& config, const std::string& file,
                               Faults& faults);
 
+/// The required key "mount" as a frame.
+template <typename To, typename From>
+void read_mount_of(Map& map, Transform<To, From>& mount) {
+  const Node* node = map.node("mount", Need::Required);
+  if (node == nullptr) return;
+  Map inner(*node, map.file(), map.dotted("mount"), map.faults());
+  if (node->kind == Node::Kind::Map) read_mount(inner, mount.iso);
+}
+
 /// "host:port" or "[v6]:port"; port 0 = a free one where `zero_is_free`.
 bool read_endpoint(Map& map, const char* key, Endpoint& endpoint, bool zero_is_free);
 

@@ -41,7 +41,7 @@ const char* to_string(RobotTask task) {
   return "?";
 }
 
-Cell::Cell(const cell::CellSetup& setup, const wire::Meas28Layout& laser, bool plc_required,
+Cell::Cell(const cell::CellSetup& setup, const wire::LaserFormat& laser, bool plc_required,
            CellTimeouts timeouts)
     : setup_(setup), plc_required_(plc_required), timeouts_(timeouts), laser_decoder_(laser) {
   refresh_plc();

@@ -81,7 +81,7 @@ struct LaserDevice::State {
       : scene(s),
         setup(s.cell.setup.laser),
         truth(s.laser),
-        layout(s.cell.laser_layout),
+        layout(s.cell.laser_format.meas28),
         spot(spot_points(s.laser.beam_spot)),
         baseline_mm((setup.start_of_range_mm + setup.range_mm / 2) * std::tan(truth.triangulation_rad)),
         surface(s, 0.8 * s.laser.spot_mm + 0.2) {

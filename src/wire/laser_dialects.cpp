@@ -21,6 +21,24 @@ std::variant<Meas28Decoder, LaserBlockDecoder, LaserByteDecoder> make(const Lase
 
 }  // namespace
 
+const char* to_string(LaserDialect dialect) {
+  switch (dialect) {
+    case LaserDialect::Meas28:
+      return "meas28";
+    case LaserDialect::Data28:
+      return "data28";
+    case LaserDialect::Meas32:
+      return "meas32";
+    case LaserDialect::TwoByte:
+      return "two_byte";
+    case LaserDialect::ThreeByte:
+      return "three_byte";
+    case LaserDialect::Od5000:
+      return "od5000";
+  }
+  return "?";
+}
+
 const char* laser_format_fault(const LaserFormat& f) {
   const bool bytes = f.dialect == LaserDialect::TwoByte || f.dialect == LaserDialect::ThreeByte;
   if (f.dialect == LaserDialect::Meas28) return nullptr;

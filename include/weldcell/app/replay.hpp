@@ -22,7 +22,7 @@ struct ReplayOutcome {
   std::vector<Error> differences;   ///< first one first; `where` names sequence number and byte
   std::unique_ptr<job::Cell> cell;  ///< after the last step
   cell::CellSetup setup;
-  wire::Meas28Layout laser_layout;
+  wire::LaserFormat laser_format;
   JobStory story;
   std::string recorded_solve, new_solve;  ///< marks of the last solve, JSON
 };

@@ -10,7 +10,7 @@
 
 #include "weldcell/cell/cell_setup.hpp"
 #include "weldcell/files/fault.hpp"
-#include "weldcell/wire/laser.hpp"
+#include "weldcell/wire/laser_dialects.hpp"
 #include "weldcell/wire/plc_map.hpp"
 
 namespace weldcell::files {
@@ -45,10 +45,10 @@ struct CellConfig {
   std::string rws_password_file;  ///< secrets never stand in YAML; relative to the cell file; or credential
                                   ///< "rws-password"
   std::string rws_task = "T_ROB1";
-  Endpoint laser{"127.0.0.1", 10240};
-  std::string laser_dialect = "meas28";
-  wire::Meas28Layout laser_layout;
-  std::string laser_filter = "none";  ///< the sensor's own averaging or median; part of its latency
+  Endpoint laser{"127.0.0.1", 10240};     ///< the sensor; its command port with the dialect od5000
+  Endpoint laser_listen{"127.0.0.1", 0};  ///< UDP, we listen: od5000 only
+  wire::LaserFormat laser_format;         ///< without a fault
+  std::string laser_filter = "none";      ///< the sensor's own averaging or median; part of its latency
   /// Under which the latency was measured; nothing when it was not.
   std::optional<LatencyConditions> latency_measured;
   Endpoint modbus{"127.0.0.1", 1502};     ///< we listen

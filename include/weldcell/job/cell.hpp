@@ -14,7 +14,7 @@
 #include "weldcell/job/work.hpp"
 #include "weldcell/robot/egm_session.hpp"
 #include "weldcell/wire/egm.hpp"
-#include "weldcell/wire/laser.hpp"
+#include "weldcell/wire/laser_dialects.hpp"
 #include "weldcell/wire/plc_map.hpp"
 
 namespace weldcell::job {
@@ -49,6 +49,7 @@ struct EgmCycle {
   std::vector<std::byte> datagram, reply;
   robot::EgmReport report;
 };
+/// As received at once: a piece of the stream, or one datagram.
 struct LaserBytes {
   std::vector<std::byte> bytes;
 };
@@ -207,7 +208,7 @@ struct CellTimeouts {
 
 class Cell {
  public:
-  Cell(const cell::CellSetup& setup, const wire::Meas28Layout& laser, bool plc_required,
+  Cell(const cell::CellSetup& setup, const wire::LaserFormat& laser, bool plc_required,
        CellTimeouts timeouts = {});
 
   Outputs step(const Input& input);
@@ -294,7 +295,7 @@ class Cell {
   int guide_step_ = 0;
 
   wire::EgmCodec codec_;
-  wire::Meas28Decoder laser_decoder_;
+  wire::LaserDecoder laser_decoder_;
   std::uint64_t next_request_ = 1, awaited_request_ = 0;
   RobotTask awaited_task_ = RobotTask::Query;
   bool program_started_ = false;

@@ -20,6 +20,9 @@ enum class LaserDialect : std::uint8_t {
   Od5000,     ///< SICK OD5000 and Optex CDX, UDP push
 };
 
+/// As the cell file writes it: "meas28", "data28", ...
+const char* to_string(LaserDialect dialect);
+
 /// What the bytes alone do not say. docs/LASERS.md lists what each dialect needs.
 struct LaserFormat {
   LaserDialect dialect = LaserDialect::Meas28;

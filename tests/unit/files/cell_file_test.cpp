@@ -49,8 +49,9 @@ TEST(CellFile, ReadsTheDemoCell) {
   EXPECT_EQ(c.egm.port, 6511);
   EXPECT_EQ(c.rws.host, "127.0.0.1");
   EXPECT_TRUE(std::filesystem::exists(c.rws_password_file)) << c.rws_password_file;
-  EXPECT_TRUE(c.laser_layout.counter && c.laser_layout.timestamp);
-  EXPECT_FALSE(c.laser_layout.status || c.laser_layout.exposure || c.laser_layout.intensity);
+  EXPECT_TRUE(c.laser_format.meas28.counter && c.laser_format.meas28.timestamp);
+  EXPECT_FALSE(c.laser_format.meas28.status || c.laser_format.meas28.exposure ||
+               c.laser_format.meas28.intensity);
   EXPECT_NEAR(c.setup.laser.triangulation_rad, 0.3, 1e-7);
   EXPECT_LT((c.setup.laser.T_flange_laser.position_mm() - Eigen::Vector3d(0, -80, 200)).norm(), 1e-12);
   const Eigen::Matrix3d torch = c.setup.torch.T_flange_torch.rotation();
@@ -165,6 +166,43 @@ TEST(ArmFile, SaysWhatIsWrong) {
   EXPECT_THAT(changed("c2: 900", "c2: -900"), HasSubstr("arm.lengths_mm.c2: -900 is out of range"));
   EXPECT_THAT(changed("c2: 900, ", ""), HasSubstr("arm.lengths_mm.c2: is missing: add 'c2:'"));
   EXPECT_THAT(changed("max_speed_deg_s: [175, ", "max_speed_deg_s: ["), HasSubstr("has 5 values: write 6"));
+}
+
+TEST(CellFile, ReadsEveryLaserDialect) {
+  const auto format_of = [](const std::string& lines) {
+    const auto read = parse_cell(demo_with("  dialect: meas28\n", lines), "cell.yaml", kConfig + "/robots");
+    EXPECT_TRUE(std::holds_alternative<CellConfig>(read)) << text(std::get<Faults>(read));
+    return std::get<CellConfig>(read).laser_format;
+  };
+  const std::string old_frame = "  frame: [counter, timestamp]\n";
+  EXPECT_EQ(format_of("").dialect, wire::LaserDialect::Meas28);
+  EXPECT_EQ(format_of("  dialect: meas28\n").dialect, wire::LaserDialect::Meas28);
+  const auto with = [&](const std::string& lines) {
+    std::string cell = demo_with("  dialect: meas28\n", lines);
+    cell.erase(cell.find(old_frame), old_frame.size());
+    const auto read = parse_cell(cell, "cell.yaml", kConfig + "/robots");
+    EXPECT_TRUE(std::holds_alternative<CellConfig>(read)) << text(std::get<Faults>(read));
+    return std::get<CellConfig>(read).laser_format;
+  };
+  wire::LaserFormat f = with("  dialect: data28\n  frame: [other, distance, timestamp]\n");
+  EXPECT_EQ(f.dialect, wire::LaserDialect::Data28);
+  EXPECT_EQ(f.words, 3U);
+  EXPECT_EQ(f.distance_word, 1U);
+  EXPECT_EQ(f.timestamp_word, 2);
+  f = with("  dialect: meas32\n  frame: [other, distance]\n  raw_min: 15853\n  raw_max: 3261\n");
+  EXPECT_EQ(f.dialect, wire::LaserDialect::Meas32);
+  EXPECT_EQ(f.words, 2U);
+  EXPECT_EQ(f.distance_word, 1U);
+  EXPECT_DOUBLE_EQ(f.raw_min, 15853);
+  EXPECT_DOUBLE_EQ(f.raw_max, 3261);
+  EXPECT_DOUBLE_EQ(f.range_mm, 200);
+  for (const char* name : {"two_byte", "three_byte"}) {
+    f = with(std::string("  dialect: ") + name + "\n");
+    EXPECT_STREQ(wire::to_string(f.dialect), name);
+    EXPECT_DOUBLE_EQ(f.range_mm, 200);
+    EXPECT_DOUBLE_EQ(f.rate_hz, 5000);
+    EXPECT_EQ(wire::laser_format_fault(f), nullptr);
+  }
 }
 
 }  // namespace

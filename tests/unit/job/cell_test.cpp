@@ -33,7 +33,7 @@ std::shared_ptr<const Prepared> prepared() {
 /// Drives a cell and remembers what came out.
 class Driver {
  public:
-  explicit Driver(bool plc_required = false) : cell(setup(), wire::Meas28Layout{}, plc_required) {}
+  explicit Driver(bool plc_required = false) : cell(setup(), wire::LaserFormat{}, plc_required) {}
 
   static cell::CellSetup setup() {
     cell::CellSetup s;

@@ -30,7 +30,7 @@ std::vector<Sample> sweep(const Scene& scene, double x_from, double x_to, double
     return Transform<Base, Flange>{out};
   };
   std::vector<Sample> out;
-  wire::Meas28Decoder decoder(scene.cell.laser_layout);
+  wire::Meas28Decoder decoder(scene.cell.laser_format.meas28);
   const double duration = std::abs(x_to - x_from) / speed;
   for (const LaserBlock& block : laser.advance({from_seconds(duration)}, pose)) {
     decoder.feed(block.bytes, [&](const wire::LaserReading& reading) {
