@@ -36,19 +36,33 @@ const char* to_string(PanelState state) {
   return "sysfail";
 }
 
+namespace {
+
+int generation_of(const Scene& scene) {
+  if (scene.controller.rws_generation != 0) return scene.controller.rws_generation;
+  return scene.cell.rws_generation == files::RwsGenerationChoice::Two ? 2 : 1;
+}
+
+EgmShape shape_of(const Scene& scene) {
+  const ControllerTruth& truth = scene.controller;
+  const int usual = generation_of(scene) == 2 ? 716 : 610;
+  return {truth.robotware != 0 ? truth.robotware : usual, truth.external_axes, truth.egm_seqno_restarts};
+}
+
+}  // namespace
+
 ControllerState::ControllerState(const Scene& scene, const kinematics::ArmModel& arm_model)
     : truth(scene.controller),
       arm(arm_model),
       cycle_s(scene.controller.cycle_ms * 1e-3),
       task(memory, *this),
-      egm(arm_model, scene.controller.position_gain, scene.controller.low_pass_hz, cycle_s),
+      egm(arm_model, scene.controller.position_gain, scene.controller.low_pass_hz, cycle_s, shape_of(scene)),
       path(arm_model, cycle_s),
       servo(cycle_s, scene.controller.dead_time_ms * 1e-3, scene.cell.setup.home),
       reference(scene.cell.setup.home) {
   path.reset(reference);
-  generation = truth.rws_generation != 0                                      ? truth.rws_generation
-               : scene.cell.rws_generation == files::RwsGenerationChoice::Two ? 2
-                                                                              : 1;
+  generation = generation_of(scene);
+  configuration = default_configuration(scene.cell.egm.host, scene.cell.egm.port);
   for (int i = 1; i <= 120; ++i) {
     const std::string number = std::to_string(i);
     idle_signals["doSpare" + std::string(3 - number.size(), '0') + number] = 0;
@@ -124,6 +138,8 @@ void ControllerState::start_ramp(double duration_s) {
 void ControllerState::set_auto(bool automatic) {
   if (automatic == truth.auto_mode) return;
   truth.auto_mode = automatic;
+  manual_full_speed = false;
+  rmmp = {};
   stop_program("operating mode changed");
   if (panel == PanelState::MotorsOn) set_panel(PanelState::MotorsOff);
   log(1, automatic ? 10017 : 10015, automatic ? "Automatic mode confirmed" : "Manual mode selected");
@@ -136,6 +152,9 @@ void ControllerState::restart(double duration_s) {
   egm_interrupted = false;
   task.clear_pointer();
   mastership.clear();
+  mastership_ids.clear();
+  rmmp = {};
+  rapid_state_unknown = truth.rapid_state_lost;
   ++restarts;
   fault_until_s["restart"] = seconds(now.ns) + (duration_s > 0 ? duration_s : kRestart_s);
 }
@@ -251,6 +270,7 @@ std::vector<std::byte> ControllerState::egm_frame() {
   frame.planned_us = device_us(now) + std::llround(truth.dead_time_ms * 1e3 + cycle_s * 1e6);
   frame.motors_on = motors_on();
   frame.rapid_running = task.running();
+  frame.rapid_unknown = rapid_state_unknown;
   return egm.frame(frame);
 }
 
@@ -306,6 +326,7 @@ ports::HttpReply Controller::handle_rws(const ports::HttpRequest& request, int s
 }
 
 void Controller::end_rws_session(int session) {
+  if (state_->rmmp.session == session) state_->rmmp = {};
   std::erase_if(state_->mastership, [session](const auto& held) { return held.second == session; });
 }
 

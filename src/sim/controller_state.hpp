@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/configuration.hpp"
 #include "sim/egm_channel.hpp"
 #include "sim/path_motion.hpp"
 #include "sim/rapid_task.hpp"
@@ -20,6 +21,14 @@ namespace weldcell::sim {
 
 enum class PanelState { MotorsOff, MotorsOn, GuardStop, EmergencyStop, EmergencyStopReset };
 const char* to_string(PanelState state);
+
+/// Remote access in manual mode, which a person grants at the pendant.
+struct ManualPrivilege {
+  int session = 0;        ///< that asked; 0: nobody
+  std::string privilege;  ///< "modify" or "exec"
+  int polls = 0;          ///< the person grants at the second
+  bool granted() const { return session != 0 && polls >= 2; }
+};
 
 /// What moves the reference in this cycle.
 enum class Drive { Path, Egm, Ramp };
@@ -46,6 +55,9 @@ struct ControllerState final : rapid::Machine {
   std::vector<std::pair<std::string, double>> signals();
   void set_signal(const std::string& name, double value);
   void log(int type, int code, const std::string& title, const std::string& text = "");
+  const char* operation_mode() const {
+    return truth.auto_mode ? "AUTO" : manual_full_speed ? "MANF" : "MANR";
+  }
   bool motors_on() const { return panel == PanelState::MotorsOn; }
   std::int64_t device_us(HostTime t) const;
   std::vector<std::byte> egm_frame();
@@ -89,7 +101,14 @@ struct ControllerState final : rapid::Machine {
   std::vector<Event> events;
   int event_number = 0;
   std::uint64_t programs_ended = 0;
-  std::map<std::string, int> mastership;     ///< domain -> session that holds it
+  std::map<std::string, int> mastership;      ///< domain -> session that holds it
+  std::map<std::string, int> mastership_ids;  ///< domain -> id given with it, where one was asked for
+  int last_mastership_id = 0;
+  ManualPrivilege rmmp;
+  bool manual_full_speed = false;
+  bool rapid_state_unknown = false;
+  double calendar_set_s = 0;  ///< by which a client moved the calendar
+  Configuration configuration;
   std::map<std::string, std::string> files;  ///< $HOME, lower-case path -> content
   std::set<std::string> folders;             ///< below $HOME, lower-case paths
   int generation = 1;                        ///< of RWS

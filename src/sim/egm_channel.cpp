@@ -17,8 +17,8 @@ constexpr double kEncoderStep_rad = 2e-6;  // a convergence band narrower than t
 }  // namespace
 
 EgmChannel::EgmChannel(const kinematics::ArmModel& arm, double position_gain, double low_pass_hz,
-                       double cycle_s)
-    : arm_(arm), gain_(position_gain), low_pass_hz_(low_pass_hz), cycle_s_(cycle_s) {}
+                       double cycle_s, EgmShape shape)
+    : arm_(arm), gain_(position_gain), low_pass_hz_(low_pass_hz), cycle_s_(cycle_s), shape_(shape) {}
 
 void EgmChannel::reset() {
   state_ = EgmState::Disconnected;
@@ -34,7 +34,7 @@ void EgmChannel::get_id() {
 
 void EgmChannel::set_up(double comm_timeout_s) {
   comm_timeout_s_ = comm_timeout_s;
-  seqno_ = 0;
+  if (shape_.seqno_restarts) seqno_ = 0;
   activated_ = false;
   sending_ = false;
   queue_.clear();
@@ -54,10 +54,12 @@ bool EgmChannel::run(const EgmRun& run, const Joints& at) {
   if (state_ != EgmState::Connected || !activated_) return false;
   run_ = run;
   state_ = EgmState::Running;
+  ++moves_;
   mci_ = MciReport::Running;
   sending_ = true;
   start_ = reference_ = at;
   speed_reference_ = filtered_ = {};
+  pose_target_ = kinematics::forward(arm_, at).iso * activation_.tool;
   age_s_ = running_s_ = converged_s_ = utilization_ = 0;
   convergence_met_ = out_of_range_ = false;
   position_given_ = true;
@@ -78,19 +80,25 @@ void EgmChannel::on_datagram(std::span<const std::byte> datagram) {
   if (queue_.size() < kQueueLimit) queue_.emplace_back(datagram.begin(), datagram.end());
 }
 
+bool EgmChannel::refuse(const char* why) {
+  ++malformed_;
+  complaint_ = why;
+  return false;
+}
+
 bool EgmChannel::read(std::span<const std::byte> datagram) {
   abb::egm::EgmSensor message;
-  const auto refuse = [this](const char* why) {
-    ++malformed_;
-    complaint_ = why;
-    return false;
-  };
   if (datagram.empty() || datagram.size() > kMaxDatagram) return refuse("wrong size");
   if (!message.ParseFromArray(datagram.data(), static_cast<int>(datagram.size())))
     return refuse("not a protobuf message");
   if (!message.has_header()) return refuse("no header");
   if (message.header().mtype() != abb::egm::EgmHeader::MSGTYPE_CORRECTION)
     return refuse("message type is not CORRECTION");
+  // Clients send joints and pose in one message: the one that is not guided by is ignored.
+  return activation_.pose ? take_pose(message) : take_joints(message);
+}
+
+bool EgmChannel::take_joints(const abb::egm::EgmSensor& message) {
   const bool position = message.has_planned() && message.planned().has_joints();
   const bool speed = message.has_speedref() && message.speedref().has_joints();
   if (!position && !speed) return refuse("neither joints nor joint speeds");
@@ -137,7 +145,7 @@ EgmChannel::Outcome EgmChannel::step(Joints& position, Joints& speed) {
     mci_ = MciReport::Error;
     return Outcome::OutOfRange;
   }
-  convergence_met_ = converged(position);
+  convergence_met_ = activation_.pose ? pose_converged(position) : converged(position);
   converged_s_ = convergence_met_ ? converged_s_ + cycle_s_ : 0;
   if (convergence_met_ && converged_s_ >= run_.cond_time_s) return Outcome::Converged;
   return Outcome::None;
@@ -187,65 +195,6 @@ bool EgmChannel::converged(const Joints& position) const {
 bool EgmChannel::frame_due() {
   if (!sending_) return false;
   return cycle_count_++ % std::max(1, activation_.sample_cycles) == 0;
-}
-
-namespace {
-
-void put_joints(const Joints& joints, abb::egm::EgmJoints* out) {
-  for (const double joint : joints) out->add_joints(deg(joint));
-}
-
-void put_pose(const Eigen::Isometry3d& pose, abb::egm::EgmPose* out) {
-  const Eigen::Vector3d p = pose.translation();
-  out->mutable_pos()->set_x(p.x());
-  out->mutable_pos()->set_y(p.y());
-  out->mutable_pos()->set_z(p.z());
-  const Eigen::Matrix3d r = pose.linear();
-  const Eigen::Quaterniond q(r);
-  out->mutable_orient()->set_u0(q.w());
-  out->mutable_orient()->set_u1(q.x());
-  out->mutable_orient()->set_u2(q.y());
-  out->mutable_orient()->set_u3(q.z());
-  out->mutable_euler()->set_x(deg(std::atan2(r(2, 1), r(2, 2))));
-  out->mutable_euler()->set_y(deg(std::atan2(-r(2, 0), std::hypot(r(2, 1), r(2, 2)))));
-  out->mutable_euler()->set_z(deg(std::atan2(r(1, 0), r(0, 0))));
-}
-
-void put_clock(std::int64_t us, abb::egm::EgmClock* out) {
-  out->set_sec(static_cast<std::uint64_t>(us / 1'000'000));
-  out->set_usec(static_cast<std::uint64_t>(us % 1'000'000));
-}
-
-}  // namespace
-
-std::vector<std::byte> EgmChannel::frame(const EgmFrame& now) {
-  abb::egm::EgmRobot message;
-  message.mutable_header()->set_seqno(seqno_++);
-  message.mutable_header()->set_tm(now.tm_ms);
-  message.mutable_header()->set_mtype(abb::egm::EgmHeader::MSGTYPE_DATA);
-  const auto tcp = [&](const Joints& joints) {
-    return activation_.wobj.inverse() * kinematics::forward(arm_, joints).iso * activation_.tool;
-  };
-  auto* feedback = message.mutable_feedback();
-  put_joints(now.measured, feedback->mutable_joints());
-  put_pose(tcp(now.measured), feedback->mutable_cartesian());
-  put_clock(now.feedback_us, feedback->mutable_time());
-  auto* planned = message.mutable_planned();
-  put_joints(now.planned, planned->mutable_joints());
-  put_pose(tcp(now.planned), planned->mutable_cartesian());
-  put_clock(now.planned_us, planned->mutable_time());
-  message.mutable_motorstate()->set_state(now.motors_on ? abb::egm::EgmMotorState::MOTORS_ON
-                                                        : abb::egm::EgmMotorState::MOTORS_OFF);
-  message.mutable_mcistate()->set_state(static_cast<abb::egm::EgmMCIState::MCIStateType>(mci_));
-  message.set_mciconvergencemet(convergence_met_);
-  message.mutable_testsignals();
-  message.mutable_rapidexecstate()->set_state(now.rapid_running
-                                                  ? abb::egm::EgmRapidCtrlExecState::RAPID_RUNNING
-                                                  : abb::egm::EgmRapidCtrlExecState::RAPID_STOPPED);
-  message.set_utilizationrate(utilization_);
-  std::vector<std::byte> out(message.ByteSizeLong());
-  message.SerializeToArray(out.data(), static_cast<int>(out.size()));
-  return out;
 }
 
 }  // namespace weldcell::sim

@@ -38,6 +38,10 @@ void Memory::define_standard() {
   literal("wobj0", "wobjdata", "[FALSE,TRUE,\"\",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]]");
   literal("load0", "loaddata", "[0.001,[0,0,0.001],[1,0,0,0],0,0,0]");
   define("ROB_1", "mecunit", Value::of(std::string("ROB_1")));
+  int frame = 0;
+  for (const char* name :
+       {"EGM_FRAME_BASE", "EGM_FRAME_TOOL", "EGM_FRAME_WOBJ", "EGM_FRAME_WORLD", "EGM_FRAME_JOINT"})
+    define(name, "egmframetype", Value::of(double(frame++)));
   define("EGM_STOP_HOLD", "egmstopmode", Value::of(0.0));
   define("EGM_STOP_RAMP_DOWN", "egmstopmode", Value::of(1.0));
   define("EGM_STATE_DISCONNECTED", "egmstate", Value::of(0.0));

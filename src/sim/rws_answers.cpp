@@ -37,6 +37,17 @@ std::string xhtml_head(const std::string& title) {
          title + "</title><base href=\"http://localhost/\"/></head><body>";
 }
 
+namespace {
+
+template <typename Item>
+nlohmann::ordered_json part_json(const Item& part) {
+  nlohmann::ordered_json out{{"_type", part.type}, {"_title", part.title}};
+  for (const auto& [key, value] : part.fields) out[key] = value;
+  return out;
+}
+
+}  // namespace
+
 HttpReply RwsHandler::hal(const Items& items, const std::string& next) const {
   nlohmann::ordered_json all, states = nlohmann::ordered_json::array(), list = states;
   for (const Item& item : items) {
@@ -46,6 +57,7 @@ HttpReply RwsHandler::hal(const Items& items, const std::string& next) const {
     one["_type"] = item.type;
     one["_title"] = item.title;
     for (const auto& [key, value] : item.fields) one[key] = value;
+    for (const Item& part : item.parts) one["attrib"].push_back(part_json(part));
     (in_list ? list : states).push_back(std::move(one));
   }
   all["_links"]["base"]["href"] = "https://localhost" + path_.substr(0, path_.rfind('/') + 1);
@@ -70,6 +82,7 @@ HttpReply RwsHandler::answer(const Items& items, const std::string& next) const 
     for (const Item& item : items) {
       nlohmann::ordered_json one{{"_type", item.type}, {"_title", item.title}};
       for (const auto& [key, value] : item.fields) one[key] = value;
+      for (const Item& part : item.parts) one["attrib"].push_back(part_json(part));
       states.push_back(std::move(one));
     }
     nlohmann::ordered_json all;
@@ -88,6 +101,16 @@ HttpReply RwsHandler::answer(const Items& items, const std::string& next) const 
     reply.body += "<li class=\"" + item.type + "\" title=\"" + escaped(item.title) + "\">";
     for (const auto& [key, value] : item.fields) {
       reply.body += "<span class=\"" + key + "\">" + escaped(value) + "</span>";
+    }
+    if (!item.parts.empty()) {
+      reply.body += "<ul>";
+      for (const Item& part : item.parts) {
+        // librws looks for another class than the later clients.
+        reply.body += "<li class=\"" + part.type + (two() ? "" : "-li") + "\" title=\"" +
+                      escaped(part.title) + "\"><span class=\"value\">" + escaped(part.fields[0].second) +
+                      "</span></li>";
+      }
+      reply.body += "</ul>";
     }
     reply.body += "</li>";
   }

@@ -89,7 +89,7 @@ HttpReply RwsHandler::handle(const ports::HttpRequest& request) {
     return busy;
   }
   if (!readable) return fault(400, kRwsBadVolume, "Bad volume in " + request.path);
-  if (method_ != "PUT") form_ = parse_form(body_);
+  if (method_ != "PUT" || segment(0) == "ctrl") form_ = parse_form(body_);
   if (two()) {
     if (const auto refused = refused_type(request)) return *refused;
     if (!action_from_path()) return fault(404, kRwsNoResource, "Resource not found: " + path_);
@@ -107,6 +107,7 @@ HttpReply RwsHandler::route() {
                     "identity",
                     {{"ctrl-name", "SIM_2600"}, {"ctrl-id", ""}, {"ctrl-type", "Virtual Controller"}}}});
   }
+  if (a == "ctrl" && b == "clock") return clock();
   if (a == "rw" && b == "panel") return panel();
   if (a == "rw" && b == "rapid") {
     if (c == "execution") return execution();
@@ -123,6 +124,7 @@ HttpReply RwsHandler::route() {
   if (a == "rw" && b == "elog") return elog();
   if (a == "rw" && b == "system") return system();
   if (a == "rw" && b == "retcode") return retcode();
+  if (a == "rw" && b == "cfg") return configuration();
   return fault(404, kRwsNoResource, "Resource not found: " + path_);
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "weldcell/base/time.hpp"
 #include "weldcell/ports/http.hpp"
 
 namespace weldcell::sim {
@@ -18,6 +19,7 @@ struct ControllerState;
 inline constexpr long kRwsHeldByOther = -1073445862;
 inline constexpr long kRwsNoMastership = -1073445859;
 inline constexpr long kRwsRejected = -1073445881;
+inline constexpr long kRwsNotAllowed = -1073445867;
 inline constexpr long kRwsBadValue = -1073445879;
 inline constexpr long kRwsWrongState = -1073442809;
 inline constexpr long kRwsBadModule = -1073442813;
@@ -38,6 +40,7 @@ class RwsHandler {
   struct Item {
     std::string type, title;
     Fields fields;
+    std::vector<Item> parts{};  ///< of a configuration row: its attributes
   };
   using Items = std::vector<Item>;
 
@@ -59,6 +62,8 @@ class RwsHandler {
   ports::HttpReply set_motors();
   ports::HttpReply mastership();
   ports::HttpReply users();
+  ports::HttpReply manual_privilege();
+  ports::HttpReply mastership_with_id(const std::string& domain);
   ports::HttpReply symbol_search();
   std::optional<ports::HttpReply> no_edit_right() const;
   ports::HttpReply mechunits();
@@ -68,8 +73,12 @@ class RwsHandler {
   ports::HttpReply make_folder(const std::string& parent);
   ports::HttpReply fileservice();
   ports::HttpReply elog();
+  ports::HttpReply another_name(const std::string& path);
   ports::HttpReply system();
   ports::HttpReply retcode();
+  ports::HttpReply clock();
+  ports::HttpReply configuration();
+  ports::HttpReply load_configuration();
 
   /// `next` is the link to the next page of a list.
   ports::HttpReply answer(const Items& items, const std::string& next = "") const;
@@ -92,6 +101,8 @@ class RwsHandler {
   std::map<std::string, std::string> query_, form_;
 };
 
+/// "2026-01-01 T 00:00:04" of an instant; `set_s` is by how much clients moved the calendar.
+std::string calendar(HostTime at, double set_s);
 /// Text for XHTML.
 std::string escaped(const std::string& text);
 /// XML declaration, head and the begin of the body.

@@ -51,7 +51,7 @@ std::optional<RwsObserved> rws_observed(ControllerState& s, const std::string& u
       (suffix == "ctrlstate" || (!two && suffix.empty())))
     return RwsObserved{"pnl-ctrlstate-ev", "ctrlstate", uri, {{"ctrlstate", to_string(s.panel)}}};
   if (path == "/rw/panel/opmode" && (suffix == "opmode" || (!two && suffix.empty())))
-    return RwsObserved{"pnl-opmode-ev", "opmode", uri, {{"opmode", s.truth.auto_mode ? "AUTO" : "MANR"}}};
+    return RwsObserved{"pnl-opmode-ev", "opmode", uri, {{"opmode", s.operation_mode()}}};
   if (path == "/rw/panel/speedratio" && (suffix == "speedratio" || (!two && suffix.empty())))
     return RwsObserved{"pnl-speedratio-ev",
                        "speedratio",
@@ -71,6 +71,28 @@ std::optional<RwsObserved> rws_observed(ControllerState& s, const std::string& u
     const std::string number = std::to_string(s.event_number);
     return RwsObserved{
         "elog-message-ev", "/rw/elog/0/" + number, "/rw/elog/0/" + number, {{"seqnum", number}}};
+  }
+  if (path == "/rw/mastership" && suffix.empty()) {
+    RwsObserved out{"msh-resource-value", "mastership", uri, {}};
+    for (const char* domain : two ? std::vector{"edit", "motion"} : std::vector{"cfg", "motion", "rapid"})
+      out.fields.emplace_back(domain, s.mastership.contains(domain) ? "remote" : "nomaster");
+    return out;
+  }
+  if (path == "/rw/rapid/uiinstr" && suffix == "uievent")
+    return RwsObserved{"rap-ui-ev", "uiinstr", uri, {{"instr", ""}}};
+  if (path == "/rw/rapid/tasks/T_ROB1" && suffix == "taskchange")
+    return RwsObserved{"rap-task-ev",
+                       "T_ROB1",
+                       uri,
+                       {{"excstate", s.task.running() ? "started" : "ready"},
+                        {"taskstate", s.task.has_pointer() ? "linked" : "loaded"}}};
+  if (path == "/rw/rapid/tasks/T_ROB1/pcp" && suffix == "motionpointerchange") {
+    const auto at = s.task.position();
+    return RwsObserved{
+        "rap-mp-ev",
+        "motionpointer",
+        uri,
+        {{"modulename", at.module}, {"routinename", at.routine}, {"line", std::to_string(at.line)}}};
   }
   if (after(path, "/rw/iosystem/signals/") && suffix == "state") return signal(s, path, uri);
   if (suffix != "value") return std::nullopt;

@@ -22,13 +22,15 @@ HttpReply RwsHandler::set_motors() {
 }
 
 HttpReply RwsHandler::operation_mode() {
-  if (method_ == "GET")
-    return answer({{"pnl-opmode", "opmode", {{"opmode", s_.truth.auto_mode ? "AUTO" : "MANR"}}}});
+  if (method_ == "GET") return answer({{"pnl-opmode", "opmode", {{"opmode", s_.operation_mode()}}}});
   // A virtual controller's key can be turned from here.
   const std::string wanted = form("opmode");
-  if (!action_is("setopmode") || segments_.size() != 3 || (wanted != "auto" && wanted != "man"))
+  if (!action_is("setopmode")) return fault(400, kRwsBadValue, "Invalid action");
+  if (segments_.size() == 4 && segments_[3] == "acknowledge") return no_content();
+  if (segments_.size() != 3 || (wanted != "auto" && wanted != "man" && wanted != "manf"))
     return fault(400, kRwsBadValue, "Invalid opmode");
   s_.set_auto(wanted == "auto");
+  s_.manual_full_speed = wanted == "manf";
   return no_content();
 }
 
@@ -65,6 +67,7 @@ HttpReply RwsHandler::panel() {
 }
 
 HttpReply RwsHandler::users() {
+  if (segment(1) == "rmmp") return manual_privilege();
   if (method_ != "POST") return fault(404, kRwsNoResource, "Resource not found: " + path_);
   HttpReply reply;
   if (segments_.size() == 1) {
@@ -74,11 +77,50 @@ HttpReply RwsHandler::users() {
     reply.status = 201;
     return reply;
   }
-  const std::string privilege = form("privilege");
-  if (segment(1) != "rmmp" || (privilege != "modify" && privilege != "exec"))
-    return fault(400, kRwsBadValue, "Invalid privilege");
-  reply.status = 202;
-  return reply;
+  return fault(404, kRwsNoResource, "Resource not found: " + path_);
+}
+
+HttpReply RwsHandler::manual_privilege() {
+  ManualPrivilege& asked = s_.rmmp;
+  const bool own = asked.session == session_;
+  if (method_ == "POST" && segment(2) == "cancel") {
+    if (own) asked = {};
+    return no_content();
+  }
+  if (method_ == "POST") {
+    const std::string privilege = form("privilege");
+    if (privilege != "modify" && privilege != "exec") return fault(400, kRwsBadValue, "Invalid privilege");
+    if (asked.session != 0 && !own) return fault(403, kRwsHeldByOther, "Another client has asked");
+    asked = {session_, privilege, 0};
+    HttpReply reply;
+    reply.status = 202;
+    return reply;
+  }
+  if (segment(2) == "poll") {
+    if (own) ++asked.polls;
+    const char* const status = !own ? "NONE" : asked.granted() ? "GRANTED" : "PENDING";
+    return answer({{"user-rmmp-poll", "rmmp", {{"status", status}}}});
+  }
+  const std::string privilege =
+      asked.session == 0 ? "none" : (asked.granted() ? "" : "pending ") + asked.privilege;
+  return answer(
+      {{"user-rmmp", "rmmp", {{"userid", std::to_string(asked.session)}, {"privilege", privilege}}}});
+}
+
+HttpReply RwsHandler::mastership_with_id(const std::string& domain) {
+  if (action_ == "request-with-id") {
+    if (s_.mastership.contains(domain) && !holds(domain))
+      return fault(403, kRwsHeldByOther, "Requested resource is held by someone else");
+    s_.mastership[domain] = session_;
+    const std::string id = std::to_string(s_.mastership_ids[domain] = ++s_.last_mastership_id);
+    return answer({{"msh-resource", domain, {{"mastershipid", id}}}});
+  }
+  const auto given = s_.mastership_ids.find(domain);
+  if (given == s_.mastership_ids.end() || form("mastershipid") != std::to_string(given->second))
+    return fault(403, kRwsNoMastership, "Mastership of " + domain + " has another id");
+  s_.mastership_ids.erase(given);
+  s_.mastership.erase(domain);
+  return no_content();
 }
 
 HttpReply RwsHandler::mastership() {
@@ -101,6 +143,11 @@ HttpReply RwsHandler::mastership() {
     }
     return answer(items);
   }
+  const bool asks = action_is("request") || action_is("request-with-id");
+  if (asks && !s_.truth.auto_mode && !(s_.rmmp.granted() && s_.rmmp.session == session_))
+    return fault(403, kRwsRejected, "Manual mode: remote mastership has to be granted at the pendant");
+  if (action_is("request-with-id") || action_is("release-with-id"))
+    return domain.empty() ? fault(400, kRwsBadValue, "A domain is needed") : mastership_with_id(domain);
   if (action_is("request")) {
     for (const std::string& one : wanted) {
       if (s_.mastership.contains(one) && !holds(one)) {

@@ -87,10 +87,11 @@ bool RwsHandler::action_from_path() {
     return method_ == "POST";
   };
   if (a == "fileservice") {
-    if (method_ == "POST") return among(last, {"create"}) && take_action("create");
+    if (method_ == "POST") return among(last, {"create", "copy", "rename"}) && take_action(last);
     return true;
   }
   if (a == "users") return method_ != "POST" || (last == "register" ? take_action("") : b == "rmmp");
+  if (a == "rw" && b == "cfg" && method_ == "POST") return last == "load" && take_action(last);
   if (a != "rw") return true;
   if (b == "panel") {
     if (segment(2) == "ctrlstate") return false;
@@ -102,7 +103,8 @@ bool RwsHandler::action_from_path() {
     return true;
   }
   if (b == "rapid") return rapid_from_path();
-  if (b == "mastership" && method_ == "POST") return among(last, {"request", "release"}) && take_action(last);
+  if (b == "mastership" && method_ == "POST")
+    return among(last, {"request", "release", "request-with-id", "release-with-id"}) && take_action(last);
   if (b == "iosystem") {
     if (method_ == "POST" && !(last == "set-value" && take_action("set"))) return false;
     return segments_.size() == 3 || segments_.size() == 6;

@@ -18,6 +18,9 @@ HttpReply RwsHandler::execution() {
   }
   if (action_is("start")) return start();
   if (action_is("stop")) {
+    const std::string how = form("stopmode");
+    if (how != "cycle" && how != "instr" && how != "stop" && how != "qstop")
+      return fault(400, kRwsBadValue, "Invalid stopmode '" + how + "'");
     s_.stop_program("stopped by RWS");
     return no_content();
   }
@@ -53,7 +56,10 @@ HttpReply RwsHandler::start() {
       !in("stopatbp", {"enabled", "disabled"}) || !in("alltaskbytsp", {"true", "false"})) {
     return fault(400, kRwsBadValue, "Invalid or missing start argument");
   }
-  if (!s_.truth.auto_mode) return fault(403, kRwsRejected, "Remote start needs AUTO");
+  const bool manual_granted = s_.rmmp.granted() && s_.rmmp.session == session_ && s_.rmmp.privilege == "exec";
+  if (!s_.truth.auto_mode && !manual_granted) return fault(403, kRwsRejected, "Remote start needs AUTO");
+  if (!s_.truth.remote_start)
+    return fault(403, kRwsNotAllowed, "User lacks the grant Remote start and stop in auto");
   if (!s_.motors_on())
     return fault(400, kRwsWrongState, "Execution start refused: motors are off [org -508]");
   if (s_.executing())

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <charconv>
-#include <ctime>
 
 #include "sim/controller_state.hpp"
 #include "sim/rws_handler.hpp"
@@ -20,15 +19,6 @@ const char* const kUnused = "8.999999E+09";
 constexpr std::size_t kMostOnAPage = 100;
 /// Network and device of every simulated signal; generation 2 addresses them in full.
 constexpr const char* kSignalPlace = "EtherNetIP/Local_IO/";
-
-/// The simulated controller's calendar begins with 2026.
-std::string calendar(HostTime at) {
-  const std::time_t t = 1767225600 + static_cast<std::time_t>(seconds(at.ns));
-  std::tm parts{};
-  gmtime_r(&t, &parts);
-  return fmt::format("{:04}-{:02}-{:02} T {:02}:{:02}:{:02}", parts.tm_year + 1900, parts.tm_mon + 1,
-                     parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
-}
 
 }  // namespace
 
@@ -173,6 +163,26 @@ HttpReply RwsHandler::make_folder(const std::string& parent) {
   return reply;
 }
 
+/// copy and rename: `path` is the file, lower case below the volume.
+HttpReply RwsHandler::another_name(const std::string& path) {
+  const auto file = s_.files.find(path);
+  if (file == s_.files.end()) return fault(404, kRwsNoPath, "Path does not exist: " + path_);
+  const std::string name = rapid::lower(form("fs-newname"));
+  if (name.empty() || name.find('/') != std::string::npos)
+    return fault(400, kRwsBadValue, "Invalid fs-newname");
+  const std::size_t folder = path.rfind('/');
+  const std::string fresh = (folder == std::string::npos ? "" : path.substr(0, folder + 1)) + name;
+  std::string content = file->second;
+  const bool copy = action_ == "copy";
+  if (!copy) s_.files.erase(file);
+  s_.files[fresh] = std::move(content);
+  if (!copy) return no_content();
+  HttpReply reply;
+  reply.status = 201;
+  reply.headers["Location"] = path_.substr(0, path_.rfind('/')) + "/" + name;
+  return reply;
+}
+
 HttpReply RwsHandler::fileservice() {
   if (rapid::lower(segment(1)) != (two() ? "home" : "$home"))
     return fault(400, kRwsBadVolume, "Bad volume " + segment(1));
@@ -183,6 +193,7 @@ HttpReply RwsHandler::fileservice() {
   }
   if (!folder.empty() && !s_.folders.contains(folder))
     return fault(404, kRwsNoPath, "Path does not exist: " + path_);
+  if (method_ == "POST" && (action_ == "copy" || action_ == "rename")) return another_name(path);
   if (method_ == "POST") return make_folder(path);
   if (method_ == "PUT") {
     if (path.empty()) return fault(400, kRwsNoPath, "File name missing");
@@ -228,13 +239,13 @@ HttpReply RwsHandler::fileservice() {
 
 HttpReply RwsHandler::elog() {
   if (method_ != "GET") return fault(400, kRwsBadValue, "Invalid action");
-  const auto item = [](const Event& event, const char* type) -> Item {
+  const auto item = [this](const Event& event, const char* type) -> Item {
     return {type,
             "/rw/elog/0/" + std::to_string(event.number),
             {{"msgtype", std::to_string(event.type)},
              {"code", std::to_string(event.code)},
              {"src-name", "T_ROB1"},
-             {"tstamp", calendar(event.at)},
+             {"tstamp", calendar(event.at, s_.calendar_set_s)},
              {"title", event.title},
              {"desc", event.text},
              {"conseqs", ""},
@@ -268,57 +279,6 @@ HttpReply RwsHandler::elog() {
   if (two()) limit = std::min(limit, kMostOnAPage);
   items.resize(std::min(limit, items.size()));
   return answer(items);
-}
-
-HttpReply RwsHandler::system() {
-  if (method_ != "GET") return fault(400, kRwsBadValue, "Invalid action");
-  const char* const sysid = "{5E5A0000-0000-4000-8000-000000002600}";
-  Items items;
-  if (two()) {
-    items.push_back({"sys-system",
-                     "system",
-                     {{"major", "7"},
-                      {"minor", "16"},
-                      {"name", "SIM_2600"},
-                      {"rwversion", "7.16.0+229"},
-                      {"sysid", sysid},
-                      {"starttm", calendar(s_.started_at)}}});
-  } else {
-    items.push_back({"sys-system-li",
-                     "system",
-                     {{"name", "SIM_2600"},
-                      {"rwversion", "6.10.0130"},
-                      {"rwversionname", "6.10.01.00"},
-                      {"sysid", sysid},
-                      {"starttm", calendar(s_.started_at)}}});
-  }
-  const char* const one[] = {"616-1 PC Interface", "689-1 Externally Guided Motion (EGM)", "633-4 Arc"};
-  const char* const seven[] = {"RobotWare Base", "3124-1 Externally Guided Motion", "3117-1 Arc"};
-  for (const char* option : two() ? seven : one) {
-    items.push_back({two() ? "sys-option" : "sys-option-li", option, {{"option", option}}});
-  }
-  return answer(items);
-}
-
-HttpReply RwsHandler::retcode() {
-  static const std::map<std::string, const char*> kCodes{
-      {std::to_string(kRwsHeldByOther), "Requested resource is held by someone else"},
-      {std::to_string(kRwsNoMastership), "Required mastership is missing"},
-      {std::to_string(kRwsRejected), "The request was rejected"},
-      {std::to_string(kRwsBadValue), "Invalid parameter value"},
-      {std::to_string(kRwsWrongState), "Execution start refused in this state"},
-      {std::to_string(kRwsBadModule), "Module name invalid or module not loadable"},
-      {std::to_string(kRwsUnknownModule), "Unknown module or symbol"},
-      {std::to_string(kRwsNoResource), "Resource not found"},
-      {std::to_string(kRwsBadSignal), "Invalid IO signal"},
-      {std::to_string(kRwsNoPath), "Path does not exist"},
-      {std::to_string(kRwsBadVolume), "Bad volume"},
-      {std::to_string(kRwsBadModulePath), "Module path is wrong"}};
-  const auto found = kCodes.find(query("code"));
-  if (found == kCodes.end()) return fault(404, kRwsBadValue, "Unknown code");
-  return answer({{"retcode-info",
-                  query("code"),
-                  {{"code", found->first}, {"description", found->second}, {"severity", "Error"}}}});
 }
 
 }  // namespace weldcell::sim

@@ -32,6 +32,15 @@ bool take_number(std::string_view text, double& out) {
   return error == std::errc{} && end == text.data() + text.size() && out >= 0;
 }
 
+/// 607, 610, 700, 706, 716; 0: none of them.
+int egm_shape_of(const std::string& robotware) {
+  for (const auto& [text, number] : {std::pair{"6.07", 607}, std::pair{"6.10", 610}, std::pair{"7.0", 700},
+                                     std::pair{"7.6", 706}, std::pair{"7.16", 716}}) {
+    if (robotware == text) return number;
+  }
+  return 0;
+}
+
 class SceneReader {
  public:
   SceneReader(const std::string& path, const files::CellConfig& cell) : path_(path) { out_.cell = cell; }
@@ -174,6 +183,17 @@ class SceneReader {
     m.integer("rws_generation", c.rws_generation, {1, 2});
     m.boolean("rws_hal", c.rws_hal);
     m.number("rws_requests_per_s", c.rws_requests_per_s, {0, 10'000});
+    std::string robotware;
+    if (m.text("robotware", robotware)) {
+      c.robotware = egm_shape_of(robotware);
+      if (c.robotware == 0)
+        m.fault("robotware", "'" + robotware + "' has no EGM shape of its own",
+                "6.07, 6.10, 7.0, 7.6 or 7.16");
+    }
+    m.integer("external_axes", c.external_axes, {0, 6});
+    m.boolean("egm_seqno_restarts", c.egm_seqno_restarts);
+    m.boolean("rapid_state_lost", c.rapid_state_lost);
+    m.boolean("remote_start", c.remote_start);
     if (const Node* list = m.sequence("modules")) {
       for (const Node& node : list->items) {
         auto text = files::read_text_file(beside(node.text));

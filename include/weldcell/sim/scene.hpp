@@ -26,9 +26,14 @@ struct ControllerTruth {
   double feedback_latency_ms = 0;  ///< feedBack.time minus true instant of the posture
   std::string user = "Default User", password = "robotics";
   bool auto_mode = true;
-  int rws_generation = 0;            ///< 1 or 2; 0: what the cell file expects, 1 when it leaves it open
-  bool rws_hal = true;               ///< false: early RobotWare 7 that answers HAL with 406
-  double rws_requests_per_s = 20;    ///< more within a second are answered 503; 0: no limit
+  int rws_generation = 0;          ///< 1 or 2; 0: what the cell file expects, 1 when it leaves it open
+  bool rws_hal = true;             ///< false: early RobotWare 7 that answers HAL with 406
+  double rws_requests_per_s = 20;  ///< more within a second are answered 503; 0: no limit
+  int robotware = 0;               ///< shape of EGM frames: 607, 610, 700, 706, 716; 0: by rws_generation
+  int external_axes = 0;           ///< values that ride in externalJoints of EGM frames
+  bool egm_seqno_restarts = true;  ///< at EGMSetupUC; false: the count goes on
+  bool rapid_state_lost = false;   ///< EGM frames say RAPID UNDEFINED after a restart, as some controllers do
+  bool remote_start = true;        ///< the user has the grant to start programs in automatic mode
   std::vector<std::string> modules;  ///< texts of the RAPID modules that are loaded at start
 };
 

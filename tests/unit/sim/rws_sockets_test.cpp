@@ -302,6 +302,96 @@ TEST_P(RwsSockets, ARestartForgetsSessionsAndSubscriptions) {
   EXPECT_EQ(site.server->sessions(), 1u);
 }
 
+TEST_P(RwsSockets, EveryResourceThatClientsWatchTellsItsChange) {
+  Site site(GetParam());
+  {
+    const std::lock_guard<std::mutex> hold(site.lock);
+    ASSERT_TRUE(
+        site.controller.load_module("MODULE T\n PERS num n:=1;\n PROC main()\n  n:=2;\n  WaitTime 1;\n "
+                                    "ENDPROC\nENDMODULE"));
+  }
+  Client client(site);
+  const bool two = GetParam() == 2;
+  const std::string edit = two ? "edit" : "rapid";
+  const std::string symbol =
+      two ? "/rw/rapid/symbol/RAPID/T_ROB1/T/n/data" : "/rw/rapid/symbol/data/RAPID/T_ROB1/T/n";
+  const std::string signal = "/rw/iosystem/signals/EtherNetIP/Local_IO/doArcOn";
+  const auto act = [&](const std::string& path, const std::string& verb, const std::string& body = "") {
+    const int status = client.ask("POST", two ? path + "/" + verb : path + "?action=" + verb, body).status;
+    EXPECT_EQ(status, 204) << path << " " << verb;
+  };
+  const std::pair<std::string, std::string> watched[] = {
+      {site.state(), "pnl-ctrlstate-ev"},
+      {"/rw/panel/speedratio;speedratio", "pnl-speedratio-ev"},
+      {"/rw/rapid/execution;ctrlexecstate", "rap-ctrlexecstate-ev"},
+      {"/rw/rapid/execution;rapidexeccycle", "rap-execcycle-ev"},
+      {signal + ";state", "ios-signalstate-ev"},
+      {symbol + ";value", "rap-value-ev"},
+      {"/rw/elog/0", "elog-message-ev"},
+      {"/rw/mastership", "msh-resource-value"},
+      {"/rw/rapid/tasks/T_ROB1;taskchange", "rap-task-ev"},
+      {"/rw/rapid/tasks/T_ROB1/pcp;motionpointerchange", "rap-mp-ev"},
+      {"/rw/rapid/uiinstr;uievent", ""},
+      {"/rw/panel/opmode;opmode", "pnl-opmode-ev"}};
+  std::string body = "resources=" + std::to_string(std::size(watched));
+  for (std::size_t i = 0; i < std::size(watched); ++i) {
+    const std::string number = std::to_string(i + 1);
+    body += "&" + number + "=" + watched[i].first + "&" + number + "-p=1";
+  }
+  const Answer made = client.ask("POST", "/subscription", body);
+  ASSERT_EQ(made.status, 201) << made.body;
+  EXPECT_NE(made.body.find("rap-ui-ev"), std::string::npos);
+  ASSERT_EQ(client.open(poll_of(made)), 101);
+  act("/rw/mastership/" + edit, "request");
+  const std::string panel = two ? "/rw/panel/ctrl-state" : "/rw/panel/ctrlstate?action=setctrlstate";
+  EXPECT_EQ(client.ask("POST", panel, "ctrl-state=motoron").status, 204);
+  EXPECT_EQ(client.ask("POST", "/rw/panel/speedratio?action=setspeedratio", "speed-ratio=50").status, 204);
+  act("/rw/rapid/execution", two ? "cycle" : "setcycle", "cycle=forever");
+  act(signal, two ? "set-value" : "set", "lvalue=1");
+  act("/rw/rapid/execution", "resetpp");
+  act("/rw/rapid/execution", "start",
+      "regain=continue&execmode=continue&cycle=forever&condition=none&stopatbp=disabled&alltaskbytsp=false");
+  site.step(20);
+  std::string seen;
+  const auto missing = [&] {
+    for (const auto& [uri, type] : watched) {
+      if (type != "pnl-opmode-ev" && seen.find(type) == std::string::npos) return true;
+    }
+    return false;
+  };
+  for (int i = 0; i < 12 && missing(); ++i) seen += client.event();
+  // Turning the key also takes back what came before it.
+  site.inject("manual");
+  for (int i = 0; i < 12 && seen.find("pnl-opmode-ev") == std::string::npos; ++i) seen += client.event();
+  for (const auto& [uri, type] : watched) {
+    EXPECT_NE(seen.find(type), std::string::npos) << uri << "\n" << seen;
+    if (type != "elog-message-ev" && !type.empty()) {
+      EXPECT_NE(seen.find("href=\"" + uri + "\" rel=\"self\""), std::string::npos) << uri;
+    }
+  }
+}
+
+TEST_P(RwsSockets, LoggingOutGivesMastershipBack) {
+  Site site(GetParam());
+  Client client(site), other(site);
+  const std::string path =
+      GetParam() == 2 ? "/rw/mastership/edit/request" : "/rw/mastership/rapid?action=request";
+  EXPECT_EQ(client.ask("POST", path).status, 204);
+  EXPECT_EQ(other.ask("POST", path).status, 403);
+  EXPECT_EQ(client.ask("GET", "/logout").status, 200);
+  EXPECT_EQ(other.ask("POST", path).status, 204);
+}
+
+TEST_P(RwsSockets, AThousandResourcesAGroup) {
+  Site site(GetParam());
+  Client client(site);
+  std::string body = "resources=1";
+  for (int i = 1; i <= 1001; ++i)
+    body += "&" + std::to_string(i) + "=/rw/panel/opmode;opmode&" + std::to_string(i) + "-p=1";
+  EXPECT_EQ(client.ask("POST", "/subscription", body).status, 400);
+  EXPECT_EQ(client.ask("POST", "/subscription", body.substr(0, body.rfind("&1001="))).status, 201);
+}
+
 TEST_P(RwsSockets, TooManyRequestsAreAnswered503) {
   Site site(GetParam(), 10);
   Client client(site);
