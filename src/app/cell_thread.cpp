@@ -102,11 +102,21 @@ void CellThread::feed(HostTime time, job::InputBody body) {
   if (record_) record_->input(input);
   const job::Outputs outputs = cell_.step(input);
   if (record_) record_->outputs(time, outputs);
-  if (story_) story_->note(time, outputs);
+  if (story_) {
+    story_->note(time, outputs);
+    story_->note_input(input);
+  }
+  if (const auto* cycle = std::get_if<job::EgmCycle>(&input.body)) watch(*cycle);
   dispatch(outputs);
   wiring_.wants_laser.store(cell_.wants_laser(), std::memory_order_relaxed);
   wiring_.takes_jobs.store(cell_.takes_jobs(), std::memory_order_relaxed);
   wiring_.publish(cell_.status());
+}
+
+void CellThread::watch(const job::EgmCycle& cycle) {
+  egm_.on(cycle);
+  for (const std::string& warning : egm_.take_warnings()) spdlog::warn("{}", warning);
+  wiring_.publish(egm_.figures());
 }
 
 void CellThread::dispatch(const job::Outputs& outputs) {

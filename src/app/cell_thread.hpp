@@ -7,6 +7,7 @@
 
 #include "app/wiring.hpp"
 #include "weldcell/adapters/journal_file.hpp"
+#include "weldcell/app/egm_watch.hpp"
 #include "weldcell/app/job_story.hpp"
 #include "weldcell/app/record.hpp"
 
@@ -21,6 +22,7 @@ class CellThread {
  private:
   void drain();
   void feed(HostTime time, job::InputBody body);
+  void watch(const job::EgmCycle& cycle);
   void dispatch(const job::Outputs& outputs);
   void dispatch(const job::Output& output);
   void begin_job(const std::shared_ptr<const ActiveJob>& job);
@@ -32,6 +34,7 @@ class CellThread {
   Wiring& wiring_;
   std::string arm_yaml_;
   job::Cell cell_;
+  EgmWatch egm_;
   std::shared_ptr<const ActiveJob> active_;
   std::shared_ptr<adapters::JournalFile> journal_;
   std::unique_ptr<RecordWriter> record_;

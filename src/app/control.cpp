@@ -10,6 +10,20 @@ namespace {
 
 using nlohmann::json;
 
+json egm_json(const EgmFigures& egm) {
+  return {{"frames", egm.frames},
+          {"utilization_percent", egm.utilization_percent},
+          {"peak_utilization_percent", egm.peak_percent},
+          {"overloaded_frames", egm.overloaded},
+          {"motors", to_string(egm.motors)},
+          {"motion_control", to_string(egm.mci)},
+          {"rapid", to_string(egm.rapid)},
+          {"converged", egm.converged},
+          {"limited", egm.limited},
+          {"stale", egm.stale},
+          {"malformed", egm.malformed}};
+}
+
 std::string status_json(const Wiring& wiring) {
   const job::CellStatus s = wiring.status();
   json links;
@@ -37,6 +51,7 @@ std::string status_json(const Wiring& wiring) {
         {"mode", wire::to_string(wiring.operation_mode.load())},
         {"execution", wire::to_string(wiring.execution_state.load())},
         {"subscribed", wiring.rws_live.load()}}},
+      {"egm", egm_json(wiring.egm_figures())},
       {"ports", {{"egm", wiring.egm_port.load()}, {"modbus", wiring.modbus_port.load()}}},
       {"rss_kb", adapters::rss_kb()},
       {"cpu_seconds", adapters::cpu_seconds()},

@@ -31,6 +31,14 @@ void JobStory::note(HostTime time, const job::Outputs& outputs) {
   }
 }
 
+void JobStory::note_input(const job::Input& input) {
+  const auto* cycle = std::get_if<job::EgmCycle>(&input.body);
+  if (cycle == nullptr) return;
+  egm_.on(*cycle);
+  for (const std::string& warning : egm_.take_warnings())
+    events_.push_back({begun_ ? seconds(input.time - begin_) : 0, warning, true});
+}
+
 review::ReportInput JobStory::report(const job::Cell& cell, const cell::CellSetup& setup,
                                      const std::string& program_version,
                                      const std::string& accepted_at) const {
@@ -73,6 +81,11 @@ review::ReportInput JobStory::report(const job::Cell& cell, const cell::CellSetu
     };
   }
   input.figures.push_back({"scanning", fmt::format("{:.1f}", scan_s_), "s"});
+  if (const EgmFigures& egm = egm_.figures(); egm.frames > 0) {
+    input.figures.push_back({"robot's peak utilization", fmt::format("{:.0f}", egm.peak_percent), "%"});
+    input.figures.push_back({"references cut by our limits", std::to_string(egm.limited), ""});
+    input.figures.push_back({"robot frames too late to answer", std::to_string(egm.stale), ""});
+  }
   input.events = events_;
   for (std::size_t i = 0; i < drawings_.size(); ++i) {
     const bool titled = cell.prepared() && i < cell.prepared()->steps.size();
@@ -93,6 +106,14 @@ std::string JobStory::result_json(const job::Cell& cell) const {
   out["localize_ms"] = solve_s_ * 1e3;
   out["passes"] = cell.status().pass;
   out["seams_done"] = cell.status().seams_done;
+  if (const EgmFigures& egm = egm_.figures(); egm.frames > 0) {
+    out["egm"] = {{"frames", egm.frames},
+                  {"peak_utilization_percent", egm.peak_percent},
+                  {"overloaded_frames", egm.overloaded},
+                  {"limited", egm.limited},
+                  {"stale", egm.stale},
+                  {"malformed", egm.malformed}};
+  }
   if (const auto solution = cell.solution()) {
     const auto& found = solution->found;
     out["found"] = {

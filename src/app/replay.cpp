@@ -152,6 +152,7 @@ class Replayer {
     if (auto* arrived = std::get_if<job::JobArrived>(&input.body)) arrived->order = context_.order;
     const job::Outputs outputs = outcome_.cell->step(input);
     outcome_.story.note(input.time, outputs);
+    outcome_.story.note_input(input);
     for (const job::Output& output : outputs) serve(output);
     compare(step, outputs);
   }

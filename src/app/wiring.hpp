@@ -11,6 +11,7 @@
 #include <string>
 
 #include "app/mailbox.hpp"
+#include "weldcell/app/egm_watch.hpp"
 #include "weldcell/files/cell_file.hpp"
 #include "weldcell/job/cell.hpp"
 #include "weldcell/robot/egm_session.hpp"
@@ -116,10 +117,19 @@ struct Wiring {
     const std::lock_guard lock(status_mutex);
     last_status = s;
   }
+  void publish(const EgmFigures& figures) {
+    const std::lock_guard lock(status_mutex);
+    last_egm = figures;
+  }
+  EgmFigures egm_figures() const {
+    const std::lock_guard lock(status_mutex);
+    return last_egm;
+  }
 
  private:
   mutable std::mutex status_mutex;
   job::CellStatus last_status;
+  EgmFigures last_egm;
   std::string last_spool_fault;
 };
 

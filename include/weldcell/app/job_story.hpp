@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "weldcell/app/egm_watch.hpp"
 #include "weldcell/job/cell.hpp"
 #include "weldcell/review/report.hpp"
 
@@ -14,6 +15,8 @@ class JobStory {
  public:
   /// Gathers the outputs of one step; call it for every step of the job, the first with JobArrived.
   void note(HostTime time, const job::Outputs& outputs);
+  /// An input of the job: EGM cycles are watched, the rest is left alone.
+  void note_input(const job::Input& input);
   /// The solver's time on the host; not part of what replay compares.
   void note_solve_time(double seconds) { solve_s_ = seconds; }
 
@@ -33,6 +36,7 @@ class JobStory {
   std::vector<review::ReportEvent> events_;
   std::vector<std::shared_ptr<const guidance::Drawing>> drawings_;
   std::vector<plan::ScanPass> passes_;
+  EgmWatch egm_;
   double scan_s_ = 0, solve_s_ = 0;
   std::optional<job::FinishJob> end_;
 };
