@@ -15,6 +15,15 @@ TOP = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CONFIG = os.path.join(TOP, "config")
 PORTS = {"egm": 6511, "rws": 8080, "laser": 10240, "modbus": 1502}
 CAD = {"ladder": "ladder", "mitre": "mitre"}
+# The laser section's lines for each dialect, and readings a second as such a sensor gives.
+LASERS = {
+    "meas28": ("  frame: [counter, timestamp]\n", 5000),
+    "data28": ("  frame: [other, distance, timestamp]\n", 5000),
+    "meas32": ("  frame: [other, distance]\n  raw_min: 15853\n  raw_max: 3261\n", 2000),
+    "two_byte": ("", 1500),
+    "three_byte": ("", 4000),
+    "od5000": ("  listen: 127.0.0.1:0\n", 5000),
+}
 
 
 def parse(arguments=None):
@@ -33,6 +42,7 @@ def parse(arguments=None):
     parser.add_argument("--fault", action="append", default=[], help="handed to weldcell-sim, e.g. laser_drop@scan+5:2")
     parser.add_argument("--rws", type=int, choices=(1, 2), default=1,
                         help="generation of Robot Web Services: 1 as IRC5 (default), 2 as OmniCore, over TLS with a pinned certificate")
+    parser.add_argument("--laser", choices=LASERS, default="meas28", help="what the laser sends (docs/LASERS.md)")
     parser.add_argument("--timeout", type=float, default=420, help="seconds for one job")
     parser.add_argument("--bin", default=os.path.join(TOP, "build/release/bin"), help=argparse.SUPPRESS)
     return parser.parse_args(arguments)
@@ -82,6 +92,7 @@ class Demo:
                 text = text.replace(f"127.0.0.1:{PORTS[name]}", f"127.0.0.1:{port}")
         if self.options.rws == 2:
             text = self.with_generation_two(text)
+        text = self.with_laser(text)
         self.cell = os.path.join(self.dir, "cell-demo.yaml")
         with open(self.cell, "w") as f:
             f.write(text)
@@ -101,6 +112,16 @@ class Demo:
         made = subprocess.run([self.program("weldcell-sim"), "--make-certificate", self.certificate],
                               capture_output=True, text=True, check=True)
         return re.sub(r"^rws:$", f"rws:\n  generation: 2\n  certificate_sha256: {made.stdout.strip()}", text, flags=re.M)
+
+    def with_laser(self, text):
+        """The laser section for the dialect asked for."""
+        lines, rate_hz = LASERS[self.options.laser]
+        for old, new in (("  dialect: meas28\n", f"  dialect: {self.options.laser}\n"), ("  frame: [counter, timestamp]\n", lines),
+                         ("  rate_hz: 5000\n", f"  rate_hz: {rate_hz}\n")):
+            if old not in text:
+                sys.exit(f"config/cell-demo.yaml no longer has the line '{old.strip()}'")
+            text = text.replace(old, new)
+        return text
 
     def job_file_text(self):
         with open(os.path.join(CONFIG, f"jobs/demo-{self.part}.yaml")) as f:

@@ -75,7 +75,7 @@ struct Wiring {
   // One second of data each. Full: the newest is dropped and counted; the cell turns a loss in a scan into a
   // fault.
   rt::SpscRing<EgmItem, 256> egm;
-  rt::SpscRing<LaserItem, 512> laser;
+  rt::SpscRing<LaserItem, 1024> laser;
 
   Mailbox<Message> inbox{1024};  ///< full: the sender's command fails, a device thread tries again
   Mailbox<job::RobotRequest> robot_requests{16};  ///< full: fault, the cell waits for an answer in vain

@@ -11,11 +11,10 @@ namespace {
 
 using wire::LaserDialect;
 
-constexpr Choice<LaserDialect> kDialects[] = {{"meas28", LaserDialect::Meas28},
-                                              {"data28", LaserDialect::Data28},
-                                              {"meas32", LaserDialect::Meas32},
-                                              {"two_byte", LaserDialect::TwoByte},
-                                              {"three_byte", LaserDialect::ThreeByte}};
+constexpr Choice<LaserDialect> kDialects[] = {
+    {"meas28", LaserDialect::Meas28},        {"data28", LaserDialect::Data28},
+    {"meas32", LaserDialect::Meas32},        {"two_byte", LaserDialect::TwoByte},
+    {"three_byte", LaserDialect::ThreeByte}, {"od5000", LaserDialect::Od5000}};
 
 bool is_bytes(LaserDialect d) { return d == LaserDialect::TwoByte || d == LaserDialect::ThreeByte; }
 

@@ -5,26 +5,19 @@
 #include <cmath>
 
 #include "sim/laser_light.hpp"
+#include "sim/laser_wire.hpp"
 #include "sim/noise.hpp"
 #include "sim/surface.hpp"
 #include "weldcell/base/units.hpp"
-#include "weldcell/wire/laser.hpp"
 
 namespace weldcell::sim {
 
 namespace {
 
-// Error words of the optoNCDT 2300.
-constexpr std::uint32_t kNoPeak = 0x7FFFFFFB;
-constexpr std::uint32_t kBeforeRange = 0x7FFFFFFA;
-constexpr std::uint32_t kAfterRange = 0x7FFFFFF9;
-
-constexpr double kBlock_s = 0.004;
 constexpr double kLeastLight = 0.06;    // of a full spot: below it the sensor finds no peak
 constexpr double kPeaksApart_mm = 3.0;  // images farther apart than this are two peaks, not one
 constexpr double kWayRound_mm = 8;      // most that light by way of a member's side travels farther
 constexpr double kWire_ms = 0.05;       // floor of the transport
-constexpr std::uint32_t kOrderNumber = 4120176, kSerialNumber = 260021;
 
 enum Purpose : std::uint64_t {
   White = 1,
@@ -81,13 +74,12 @@ struct LaserDevice::State {
       : scene(s),
         setup(s.cell.setup.laser),
         truth(s.laser),
-        layout(s.cell.laser_format.meas28),
+        wire(s.cell.laser_format),
         spot(spot_points(s.laser.beam_spot)),
         baseline_mm((setup.start_of_range_mm + setup.range_mm / 2) * std::tan(truth.triangulation_rad)),
         surface(s, 0.8 * s.laser.spot_mm + 0.2) {
-    per_block = std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(kBlock_s * setup.rate_hz)));
-    const std::size_t fit = (1400 - 28) / layout.frame_bytes();
-    per_block = std::min(per_block, std::max<std::size_t>(1, fit));
+    per_block = static_cast<std::size_t>(std::lround(wire.gather_s() * setup.rate_hz));
+    per_block = std::clamp<std::size_t>(per_block, 1, wire.most_samples());
     block.reserve(per_block);
   }
 
@@ -95,9 +87,9 @@ struct LaserDevice::State {
     const double device_s = static_cast<double>(k) / setup.rate_hz;
     return {static_cast<Nanoseconds>(std::llround(device_s / (1 + truth.clock.drift_ppm * 1e-6) * 1e9))};
   }
-  std::uint32_t stamp_us(HostTime t) const {
+  std::uint64_t clock_ns(HostTime t) const {
     const double device_s = truth.clock.offset_s + seconds(t.ns) * (1 + truth.clock.drift_ppm * 1e-6);
-    return static_cast<std::uint32_t>(static_cast<std::uint64_t>(std::floor(device_s * 1e6)));
+    return static_cast<std::uint64_t>(std::floor(device_s * 1e9));
   }
 
   double speckle(double x_mm, double y_mm) const;
@@ -107,7 +99,7 @@ struct LaserDevice::State {
   Peak look(const std::array<Eigen::Isometry3d, 3>& shots) const;
   Peak strongest(std::array<Seen, kSpotPoints>& seen, std::size_t count) const;
   Peak peak(const Eigen::Isometry3d& laser, HostTime t, std::uint64_t k, const PoseAt& pose_at);
-  wire::LaserReading measure(std::uint64_t k, HostTime t, const PoseAt& pose_at);
+  Sample measure(std::uint64_t k, HostTime t, const PoseAt& pose_at);
   Eigen::Isometry3d beam(HostTime t, const PoseAt& pose_at) const {
     return pose_at(t).iso * setup.T_flange_laser.iso;
   }
@@ -116,14 +108,14 @@ struct LaserDevice::State {
   const Scene scene;
   const cell::LaserSetup setup;
   const LaserTruth truth;
-  const wire::Meas28Layout layout;
+  const LaserWire wire;
   const std::vector<SpotPoint> spot;
   const double baseline_mm;
   Surface surface;
   ExposureLoop exposure;
   std::size_t per_block = 20;
   std::uint64_t next = 0;
-  std::vector<wire::LaserReading> block;
+  std::vector<Sample> block;
   HostTime last_arrival, drop_until, stall_until;
   HostTime now;
 };
@@ -236,26 +228,27 @@ Peak LaserDevice::State::peak(const Eigen::Isometry3d& laser, HostTime t, std::u
   return out;
 }
 
-wire::LaserReading LaserDevice::State::measure(std::uint64_t k, HostTime t, const PoseAt& pose_at) {
+Sample LaserDevice::State::measure(std::uint64_t k, HostTime t, const PoseAt& pose_at) {
   const Eigen::Isometry3d laser = beam(t, pose_at);
-  wire::LaserReading out;
+  Sample out;
   const auto roll = [&](Purpose purpose) { return mixed(scene.seed, k, purpose); };
-  const auto invalid = [&](std::uint32_t code) {
-    out.code = code;
+  const auto invalid = [&](Echo echo) {
+    out.echo = echo;
     return out;
   };
   const Eigen::Vector3d from = laser.translation(), down = laser.linear().col(2);
-  if (down.z() > -0.05 || uniform(roll(Dropout)) < truth.dropout_share) return invalid(kNoPeak);
+  if (down.z() > -0.05 || uniform(roll(Dropout)) < truth.dropout_share) return invalid(Echo::NoPeak);
   const double end = setup.start_of_range_mm + setup.range_mm;
-  if ((from.z() - surface.top_mm()) / -down.z() > end + 5) return invalid(kAfterRange);
-  if ((from.z() - surface.table_mm()) / -down.z() < setup.start_of_range_mm) return invalid(kBeforeRange);
+  if ((from.z() - surface.top_mm()) / -down.z() > end + 5) return invalid(Echo::BehindRange);
+  if ((from.z() - surface.table_mm()) / -down.z() < setup.start_of_range_mm)
+    return invalid(Echo::BeforeRange);
   const Peak taken = peak(laser, t, k, pose_at);
   ExposureLoop::Level level{1 / std::sqrt(std::max(taken.share, kLeastLight)), taken.share < kLeastLight};
   if (truth.exposure_loop) level = exposure.next(taken.light);
   const double distance = taken.distance_mm;
-  if (level.lost || distance <= 0) return invalid(kNoPeak);
-  if (distance < setup.start_of_range_mm) return invalid(kBeforeRange);
-  if (distance > end) return invalid(kAfterRange);
+  if (level.lost || distance <= 0) return invalid(Echo::NoPeak);
+  if (distance < setup.start_of_range_mm) return invalid(Echo::BeforeRange);
+  if (distance > end) return invalid(Echo::BehindRange);
   double reading = distance - setup.start_of_range_mm;
   const Eigen::Vector3d hit = from + distance * down;
   reading += linearity_error_mm(distance - setup.start_of_range_mm, setup.range_mm, truth.linearity_share);
@@ -264,12 +257,12 @@ wire::LaserReading LaserDevice::State::measure(std::uint64_t k, HostTime t, cons
   if (truth.speckle_mm > 0) reading += truth.speckle_mm * speckle(hit.x(), hit.y());
   if (uniform(roll(Outlier)) < truth.outlier_share) {
     const double size = uniform(roll(OutlierSize));
-    if (size > 0.8) return invalid(kNoPeak);
+    if (size > 0.8) return invalid(Echo::NoPeak);
     reading += (size / 0.4 - 1) * 0.1 * setup.range_mm;
   }
-  if (reading < 0) return invalid(kBeforeRange);
-  if (reading > setup.range_mm) return invalid(kAfterRange);
-  out.distance_mm = static_cast<float>(std::round(reading * 1e6) * 1e-6);
+  if (reading < 0) return invalid(Echo::BeforeRange);
+  if (reading > setup.range_mm) return invalid(Echo::BehindRange);
+  out.distance_mm = reading;
   return out;
 }
 
@@ -280,12 +273,7 @@ void LaserDevice::State::finish_block(HostTime last, std::vector<LaserBlock>& ou
   HostTime arrival = last + from_seconds((ready_ms + jitter_ms) * 1e-3);
   arrival = std::max({arrival, last_arrival, stall_until});
   last_arrival = arrival;
-  LaserBlock done;
-  done.arrival = arrival;
-  done.bytes.resize(28 + block.size() * layout.frame_bytes());
-  const std::size_t size = wire::encode_meas28(layout, block, kOrderNumber, kSerialNumber, done.bytes);
-  done.bytes.resize(size);
-  if (last >= drop_until && size > 0) out.push_back(std::move(done));
+  if (last >= drop_until) out.push_back({arrival, wire.encode(block)});
   block.clear();
 }
 
@@ -297,10 +285,10 @@ std::vector<LaserBlock> LaserDevice::advance(HostTime now, const PoseAt& pose_at
   std::vector<LaserBlock> out;
   s.now = now;
   for (HostTime t = s.instant(s.next); t <= now; t = s.instant(s.next)) {
-    wire::LaserReading reading = s.measure(s.next, t, pose_at);
-    reading.counter = static_cast<std::uint32_t>(s.next);
-    reading.timestamp_us = s.stamp_us(t + from_seconds(s.truth.latency_ms * 1e-3));
-    s.block.push_back(reading);
+    Sample sample = s.measure(s.next, t, pose_at);
+    sample.number = s.next;
+    sample.device_ns = s.clock_ns(t + from_seconds(s.truth.latency_ms * 1e-3));
+    s.block.push_back(sample);
     ++s.next;
     if (s.block.size() >= s.per_block) s.finish_block(t, out);
   }

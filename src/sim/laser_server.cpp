@@ -47,7 +47,7 @@ LaserServer::~LaserServer() {
   ::close(listener_);
 }
 
-void LaserServer::accept_clients() {
+void LaserServer::serve() {
   for (;;) {
     const int socket = ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket < 0) return;
@@ -91,6 +91,7 @@ void LaserServer::send_due(std::deque<LaserBlock>& blocks, HostTime now) {
 }
 
 void LaserServer::drop_clients() {
+  serve();
   for (const Client& client : clients_) ::close(client.socket);
   clients_.clear();
 }

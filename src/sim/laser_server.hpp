@@ -1,5 +1,4 @@
-// The simulated laser's wire: a TCP server that sends the live stream to every client. Used from one thread;
-// never blocks.
+// The simulated laser's wire: a TCP server that sends the live stream to every client.
 #pragma once
 
 #include <deque>
@@ -10,19 +9,32 @@
 
 namespace weldcell::sim {
 
-class LaserServer {
+/// Where the simulated sensor's bytes leave it. Used from one thread; never blocks.
+class LaserOutlet {
+ public:
+  virtual ~LaserOutlet() = default;
+  virtual int port() const = 0;
+  /// Takes in clients, or their commands, that have come.
+  virtual void serve() = 0;
+  /// Sends blocks that are due.
+  virtual void send_due(std::deque<LaserBlock>& blocks, HostTime now) = 0;
+  /// As a sensor without power or cable: nobody is served any longer.
+  virtual void drop_clients() = 0;
+};
+
+class LaserServer final : public LaserOutlet {
  public:
   /// Listens at once. Throws std::system_error when the address cannot be bound.
   explicit LaserServer(const files::Endpoint& endpoint);
-  ~LaserServer();
+  ~LaserServer() override;
   LaserServer(const LaserServer&) = delete;
   LaserServer& operator=(const LaserServer&) = delete;
 
-  int port() const { return port_; }
-  void accept_clients();
-  /// Sends blocks that are due; a client that does not keep up (1 MB behind) is dropped, as the sensor would.
-  void send_due(std::deque<LaserBlock>& blocks, HostTime now);
-  void drop_clients();
+  int port() const override { return port_; }
+  void serve() override;
+  /// A client that does not keep up (1 MB behind) is dropped, as the sensor would.
+  void send_due(std::deque<LaserBlock>& blocks, HostTime now) override;
+  void drop_clients() override;
   std::size_t clients() const { return clients_.size(); }
 
  private:

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "sim/laser_push_server.hpp"
+
 namespace weldcell::sim {
 
 namespace {
@@ -41,6 +43,12 @@ RwsServerOptions rws_options(const Scene& scene, const LiveOptions& options) {
   return out;
 }
 
+std::unique_ptr<LaserOutlet> laser_outlet(const files::CellConfig& cell) {
+  if (cell.laser_format.dialect == wire::LaserDialect::Od5000)
+    return std::make_unique<LaserPushServer>(cell.laser);
+  return std::make_unique<LaserServer>(cell.laser);
+}
+
 }  // namespace
 
 LiveCell::LiveCell(Scene scene, LiveOptions options)
@@ -49,7 +57,7 @@ LiveCell::LiveCell(Scene scene, LiveOptions options)
       controller_(scene_, scene_.cell.setup.arm),
       laser_(scene_),
       egm_(scene_.cell.egm),
-      laser_server_(scene_.cell.laser),
+      laser_outlet_(laser_outlet(scene_.cell)),
       rws_(rws_options(scene_, options_), controller_, lock_),
       faults_(scene_.faults.begin(), scene_.faults.end()) {
   if (options_.plc) {
@@ -61,7 +69,7 @@ LiveCell::LiveCell(Scene scene, LiveOptions options)
 std::string LiveCell::ports_json() const {
   const nlohmann::ordered_json out{{"egm", scene_.cell.egm.port},
                                    {"rws", rws_.port()},
-                                   {"laser", laser_server_.port()},
+                                   {"laser", laser_outlet_->port()},
                                    {"modbus", scene_.cell.modbus.port},
                                    {"rws_generation", controller_.rws_generation()},
                                    {"rws_certificate_sha256", rws_.fingerprint()}};
@@ -124,10 +132,13 @@ void LiveCell::run(const std::atomic<bool>& stop) {
     if (now >= next) {
       cycle(next);
       next = next + cycle_ns;
-      laser_server_.accept_clients();
-      if (!laser_.connected()) laser_server_.drop_clients();
+      if (laser_.connected()) {
+        laser_outlet_->serve();
+      } else {
+        laser_outlet_->drop_clients();
+      }
     }
-    laser_server_.send_due(blocks_, now);
+    laser_outlet_->send_due(blocks_, now);
     if (programs_ended_ != programs_seen_) {
       programs_seen_ = programs_ended_;
       write_truth();

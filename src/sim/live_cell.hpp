@@ -43,7 +43,7 @@ class LiveCell {
   Controller controller_;
   LaserDevice laser_;
   EgmClient egm_;
-  LaserServer laser_server_;
+  std::unique_ptr<LaserOutlet> laser_outlet_;
   RwsServer rws_;
   std::unique_ptr<PlcLink> plc_;
   std::deque<LaserBlock> blocks_;

@@ -11,11 +11,13 @@ constexpr std::uint32_t kTwoByteScale = 16368, kThreeByteScale = 65520;
 
 bool positive(double value) { return std::isfinite(value) && value > 0; }
 
-std::variant<Meas28Decoder, LaserBlockDecoder, LaserByteDecoder> make(const LaserFormat& format) {
+std::variant<Meas28Decoder, LaserBlockDecoder, LaserByteDecoder, LaserDatagramDecoder> make(
+    const LaserFormat& format) {
   if (format.dialect == LaserDialect::Meas28) return Meas28Decoder(format.meas28);
   if (format.dialect == LaserDialect::TwoByte || format.dialect == LaserDialect::ThreeByte) {
     return LaserByteDecoder(format);
   }
+  if (format.dialect == LaserDialect::Od5000) return LaserDatagramDecoder(format);
   return LaserBlockDecoder(format);
 }
 

@@ -6,10 +6,11 @@
 #include "rt/counting_allocator.hpp"
 #include "unit/robot/controller_frames.hpp"
 #include "unit/wire/egm_golden.hpp"
+#include "unit/wire/laser_streams.hpp"
 #include "weldcell/rt/hand_off.hpp"
 #include "weldcell/rt/latest.hpp"
 #include "weldcell/rt/spsc_ring.hpp"
-#include "weldcell/wire/laser.hpp"
+#include "weldcell/wire/laser_dialects.hpp"
 
 namespace weldcell {
 namespace {
@@ -126,6 +127,27 @@ TEST(NoAllocation, LaserStream) {
     }
   });
   EXPECT_GT(decoder.counters().readings, 1000U);
+}
+
+TEST(NoAllocation, EveryLaserDialect) {
+  using wire::LaserDialect;
+  for (const auto dialect : {LaserDialect::Data28, LaserDialect::Meas32, LaserDialect::TwoByte,
+                             LaserDialect::ThreeByte, LaserDialect::Od5000}) {
+    auto stream = wire::streams::blocks(dialect, 1000, 400);
+    const std::size_t block = stream.size() / 400;
+    wire::LaserDecoder decoder{wire::streams::format_of(dialect)};
+    double sum = 0;
+    const auto sink = [&](const wire::LaserReading& r) { sum += r.distance_mm; };
+    EXPECT_NO_ALLOCATION([&] {
+      for (std::size_t k = 0; k < 10; ++k) {
+        wire::streams::feed_blocks(decoder, dialect, stream, block, sink);
+        stream[k * stream.size() / 10] ^= std::byte{0xD5};
+        decoder.reset();
+      }
+    });
+    EXPECT_GT(decoder.counters().readings, 10000U) << wire::to_string(dialect);
+    EXPECT_GT(decoder.counters().resyncs, 0U) << wire::to_string(dialect);
+  }
 }
 
 TEST(NoAllocation, Queues) {

@@ -92,6 +92,26 @@ def demo_mitre(bin_dir):
         demo.end(demo.sim)
 
 
+def demo_dialect(bin_dir, laser, seed):
+    """A whole job with a laser of another dialect; its record replays."""
+    demo = make(bin_dir, "--seed", str(seed), "--laser", laser)
+    try:
+        job = demo.run(seed)
+        check_good(demo, job)
+        check_replay(demo, job)
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
+def demo_data28(bin_dir):
+    demo_dialect(bin_dir, "data28", 12)
+
+
+def demo_two_byte(bin_dir):
+    demo_dialect(bin_dir, "two_byte", 13)
+
+
 def wait_state(demo, states, seconds):
     begin = time.monotonic()
     status = None
@@ -156,8 +176,8 @@ def killed_in_scan(bin_dir):
         demo.end(demo.sim)
 
 
-def fault_in_scan(bin_dir, fault, seed, words):
-    demo = make(bin_dir, "--seed", str(seed), "--fault", fault)
+def fault_in_scan(bin_dir, fault, seed, words, *more):
+    demo = make(bin_dir, "--seed", str(seed), "--fault", fault, *more)
     try:
         demo.start_sim(seed)
         demo.start_daemon()
@@ -176,6 +196,11 @@ def fault_in_scan(bin_dir, fault, seed, words):
 
 def laser_lost_in_scan(bin_dir):
     fault_in_scan(bin_dir, "laser_drop@scan+5:3", 4, ["laser"])
+
+
+def pushed_laser_lost_in_scan(bin_dir):
+    """An OD5000 that forgets whom to send to while it is off: it is told again."""
+    fault_in_scan(bin_dir, "laser_drop@scan+5:3", 14, ["laser"], "--laser", "od5000")
 
 
 def robot_stopped_in_scan(bin_dir):

@@ -1,5 +1,5 @@
-// The simulated laser: samples on its own clock, ray-cast on the members as they really lie, as MEAS-28
-// bytes.
+// The simulated laser: samples on its own clock, ray-cast on the members as they really lie, as bytes of the
+// dialect that the cell file names.
 #pragma once
 
 #include <functional>

@@ -40,7 +40,7 @@ struct LaserFormat {
 /// Why a format cannot be decoded, with the mend; nullptr when it can.
 const char* laser_format_fault(const LaserFormat& format);
 
-/// Data28, Meas32 and Od5000: a header that counts, then frames of 32-bit words.
+/// Data28 and Meas32: a stream of blocks, a header that counts and then frames of 32-bit words.
 ///
 /// Nothing inside a frame tells damage, so a damaged frame reads as another value. A block whose header does
 /// not go on from the one before is dropped unless bytes were missing before it; the next block decides
@@ -66,11 +66,6 @@ class LaserBlockDecoder {
   struct Header {
     std::uint32_t frames = 0;
     std::uint32_t counter = 0;
-    std::uint32_t time_ns = 0;  ///< Od5000: within the device's second
-  };
-
-  struct TimeMark {
-    std::uint32_t time_ns = 0, counter = 0;
   };
 
   std::span<const std::byte> take(std::span<const std::byte> bytes) noexcept;
@@ -80,12 +75,8 @@ class LaserBlockDecoder {
   Step look_for_header() noexcept;
   Step take_frame(LaserReading& out) noexcept;
   bool may_be_header(const std::byte* p) const noexcept;
-  bool parse_header(const std::byte* p, Header& out) const noexcept;
   bool read_header(const std::byte* p, Header& out) const noexcept;
-  bool restarted_here(const std::byte* p) noexcept;
   bool accept_count() noexcept;
-  bool place_in_time() noexcept;
-  bool follows(const TimeMark& from, const TimeMark& to, double& seconds) const noexcept;
   void read_frame(const std::byte* p, LaserReading& out) const noexcept;
   void lose_sync() noexcept;
 
@@ -96,21 +87,58 @@ class LaserBlockDecoder {
   std::size_t begin_ = 0, end_ = 0;
   std::size_t last_item_ = 0;  ///< where the header or frame before begin_ starts: the way back
   bool searching_ = false, after_search_ = false, dropping_ = false;
-  std::size_t pair_left_ = 0;    ///< Od5000: bytes to the header that would confirm a restarted count
-  std::uint32_t pair_next_ = 0;  ///< the count that it must have
   Header block_;
   std::uint32_t frames_left_ = 0;
   std::uint32_t next_counter_ = 0;
   bool numbering_ = false;
-  std::uint32_t rival_next_ = 0, skip_next_ = 0;  ///< next count if the dropped header was right, was damaged
+  bool settled_ = false;          ///< some header went on from the one before
+  std::uint32_t rival_next_ = 0;  ///< next count if the dropped header was right
   bool rival_known_ = false;
   std::uint64_t moved_ = 0;  ///< stream bytes before the buffer
   std::uint64_t trusted_place_ = 0;
   std::uint32_t trusted_counter_ = 0;  ///< of the last header that went on from the one before
-  bool doubted_ = false;               ///< the last header accepted came after a search
-  std::uint32_t block_us_ = 0;         ///< Od5000: device time of the block's first reading, modulo 2^32
-  TimeMark mark_, doubt_;              ///< last header's stamp; last one that did not follow from it
-  bool timed_ = false, time_doubted_ = false;
+  bool doubted_ = false;               ///< the last header accepted did not go on from one before
+};
+
+/// Od5000: every feed() is one datagram. A datagram whose length, count and stamp do not agree with each
+/// other and with those before is dropped alone; two in a row that go on from each other are a restarted
+/// sensor.
+class LaserDatagramDecoder {
+ public:
+  /// Needs a format without a fault.
+  explicit LaserDatagramDecoder(const LaserFormat& format) : format_(format) {}
+
+  template <typename Sink>
+  void feed(std::span<const std::byte> datagram, Sink&& sink) {
+    const std::uint32_t readings = open(datagram);
+    LaserReading reading;
+    for (std::uint32_t i = 0; i < readings; ++i) {
+      read(datagram, i, reading);
+      sink(static_cast<const LaserReading&>(reading));
+    }
+  }
+  const LaserCounters& counters() const { return counters_; }
+  void reset();
+
+ private:
+  struct Mark {
+    std::uint32_t time_ns = 0, counter = 0;  ///< of a datagram's first reading, within the device's second
+    std::uint32_t us = 0;                    ///< the same on one clock of us, modulo 2^32
+    bool known = false;
+  };
+
+  /// How many readings the datagram holds; 0 when it is none of the sensor's or stands in doubt.
+  std::uint32_t open(std::span<const std::byte> datagram) noexcept;
+  void read(std::span<const std::byte> datagram, std::uint32_t index, LaserReading& out) const noexcept;
+  bool place(Mark& now, std::uint32_t readings) noexcept;
+  bool follows(const Mark& from, Mark& to, double longest_us) const noexcept;
+
+  LaserFormat format_;
+  LaserCounters counters_;
+  Mark mark_, older_;  ///< the last two datagrams taken
+  Mark doubt_;         ///< the last one that did not go on from them
+  std::uint32_t next_counter_ = 0, doubt_next_ = 0;
+  bool settled_ = false;  ///< some datagram went on from the one before
 };
 
 /// TwoByte and ThreeByte: flag bits mark each byte's place, nothing counts. The running number counts the
@@ -144,7 +172,8 @@ class LaserByteDecoder {
   std::uint32_t next_counter_ = 0;
 };
 
-/// Any laser: feed(), counters() and reset() as every dialect's decoder has them.
+/// Any laser: feed(), counters() and reset() as every dialect's decoder has them. A stream may be fed in any
+/// pieces; of Od5000 each feed() is one datagram.
 class LaserDecoder {
  public:
   /// Needs a format without a fault.
@@ -159,7 +188,7 @@ class LaserDecoder {
   void reset();
 
  private:
-  std::variant<Meas28Decoder, LaserBlockDecoder, LaserByteDecoder> decoder_;
+  std::variant<Meas28Decoder, LaserBlockDecoder, LaserByteDecoder, LaserDatagramDecoder> decoder_;
 };
 
 }  // namespace weldcell::wire
