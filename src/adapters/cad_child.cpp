@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <cstring>
 
 #include <filesystem>
 #include <fstream>
@@ -140,6 +141,13 @@ Result<std::string> import_cad_yaml(const CadRequest& request) {
   limits.memory_bytes = kCadMemoryBytes;
   auto outcome = run_limited(command_of(request), limits);
   if (!outcome.ok()) return outcome.error();
+  if (outcome->network_errno != 0 && request.warning != nullptr) {
+    *request.warning = fmt::format(
+        "{}: read with the network in reach: the kernel refused weldcell-cad a network namespace of its own "
+        "({}): "
+        "allow user namespaces (sysctl user.max_user_namespaces; RestrictNamespaces=user net in the unit)",
+        request.file, std::strerror(outcome->network_errno));
+  }
   if (outcome->exit_code != 0 || outcome->timed_out || outcome->too_much_output)
     return refusal(request, *outcome);
   const auto parsed = files::parse_workpiece(outcome->out, request.file);
@@ -152,13 +160,15 @@ Result<std::string> import_cad_yaml(const CadRequest& request) {
 }
 
 Result<std::string> import_cad_yaml(const std::string& program, const std::string& cad_file,
-                                    const job::CadImport& options, const std::string& cache_dir) {
-  return import_cad_yaml(CadRequest{program, cad_file, options, "", cache_dir, kCadTimeoutS});
+                                    const job::CadImport& options, const std::string& cache_dir,
+                                    std::string* warning) {
+  return import_cad_yaml(CadRequest{program, cad_file, options, "", cache_dir, kCadTimeoutS, warning});
 }
 
 Result<workpiece::Workpiece> import_cad(const std::string& program, const std::string& cad_file,
-                                        const job::CadImport& options, const std::string& cache_dir) {
-  auto yaml = import_cad_yaml(program, cad_file, options, cache_dir);
+                                        const job::CadImport& options, const std::string& cache_dir,
+                                        std::string* warning) {
+  auto yaml = import_cad_yaml(program, cad_file, options, cache_dir, warning);
   if (!yaml.ok()) return yaml.error();
   auto parsed = files::parse_workpiece(*yaml, cad_file);
   if (const auto* faults = std::get_if<files::Faults>(&parsed)) {

@@ -48,13 +48,15 @@ void limit(int resource, unsigned long value) {
 }
 
 /// Between fork and exec of a process with threads: only calls that are safe there.
-[[noreturn]] void become(char* const* arguments, char* const* environment, int out, int err,
+[[noreturn]] void become(char* const* arguments, char* const* environment, int out, int err, int report,
                          const ChildLimits& limits) {
   ::setpgid(0, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
   // No network. The systemd unit's RestrictNamespaces= has to leave these two kinds open.
-  if (::unshare(CLONE_NEWNET) != 0) ::unshare(CLONE_NEWUSER | CLONE_NEWNET);
+  int network_errno = 0;
+  if (::unshare(CLONE_NEWNET) != 0 && ::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) network_errno = errno;
+  if (::write(report, &network_errno, sizeof network_errno) != sizeof network_errno) ::_exit(127);
   const int nothing = ::open("/dev/null", O_RDONLY);
   if (nothing < 0 || ::dup2(nothing, 0) < 0 || ::dup2(out, 1) < 0 || ::dup2(err, 2) < 0) ::_exit(127);
   ::close_range(3, ~0U, 0);
@@ -91,8 +93,8 @@ Result<ChildOutcome> run_limited(const std::vector<std::string>& arguments, cons
     return Error{"child.start", arguments[0], std::string(what) + ": " + std::strerror(errno),
                  "see the system's limits"};
   };
-  Pipe out, err;
-  if (!out.open() || !err.open()) return failed("no pipe");
+  Pipe out, err, report;
+  if (!out.open() || !err.open() || !report.open()) return failed("no pipe");
   std::vector<char*> argument_list, environment;
   for (const std::string& argument : arguments) argument_list.push_back(const_cast<char*>(argument.c_str()));
   argument_list.push_back(nullptr);
@@ -101,12 +103,19 @@ Result<ChildOutcome> run_limited(const std::vector<std::string>& arguments, cons
 
   const pid_t child = ::fork();
   if (child < 0) return failed("no process");
-  if (child == 0) become(argument_list.data(), environment.data(), out.write_end, err.write_end, limits);
+  if (child == 0)
+    become(argument_list.data(), environment.data(), out.write_end, err.write_end, report.write_end, limits);
   ::setpgid(child, child);
   out.close_write();
   err.close_write();
+  report.close_write();
 
   ChildOutcome outcome;
+  // Comes before the program begins, or the child is gone and the pipe at its end.
+  ssize_t got = 0;
+  while ((got = ::read(report.read_end, &outcome.network_errno, sizeof outcome.network_errno)) < 0 &&
+         errno == EINTR) {
+  }
   using Clock = std::chrono::steady_clock;
   const auto deadline = Clock::now() + std::chrono::seconds(limits.timeout_s);
   bool ignored = false;

@@ -20,6 +20,8 @@ struct ChildOutcome {
   int exit_code = -1;  ///< -1 when a signal ended it
   int signal = 0;
   bool timed_out = false, too_much_output = false;
+  /// 0: the child had no network; else the errno with which the kernel refused to take it away.
+  int network_errno = 0;
   std::string out, err;
 };
 

@@ -29,6 +29,7 @@ constexpr Nanoseconds kNoDescriptorPause = 100 * kMillisecond;
 
 struct Client {
   Fd fd;
+  in_addr_t address = 0;  ///< network order
   std::array<std::uint8_t, 2 * kModbusFrameBytes> buffer{};
   std::size_t filled = 0;
   HostTime frame_begun;
@@ -84,6 +85,9 @@ struct ModbusServer::State {
 
   bool spent(Client& client, HostTime at) noexcept;
 
+  bool allows(in_addr_t address) const noexcept {
+    return allowed.empty() || std::ranges::count(allowed, address) != 0;
+  }
   void accept_all(HostTime at) noexcept;
   bool make_room(HostTime at) noexcept;
   bool serve(Client& client, HostTime at) noexcept;
@@ -93,12 +97,38 @@ struct ModbusServer::State {
 
 namespace {
 
+/// Addresses in network order.
+Result<std::vector<in_addr_t>> addresses(const std::vector<std::string>& texts,
+                                         const ModbusOptions& options) {
+  std::vector<in_addr_t> out;
+  for (const std::string& text : texts) {
+    in_addr address{};
+    if (inet_pton(AF_INET, text.c_str(), &address) != 1)
+      return fault("modbus.address", options, "allowed client '" + text + "' is not an IPv4 address",
+                   "write dotted addresses");
+    out.push_back(address.s_addr);
+  }
+  return out;
+}
+
+/// A socket that somebody else made must be one that this server can use.
+bool listens_on_ipv4(int fd) {
+  int listens = 0, domain = 0;
+  socklen_t bytes = sizeof listens;
+  if (::getsockopt(fd, SOL_SOCKET, SO_ACCEPTCONN, &listens, &bytes) != 0) return false;
+  bytes = sizeof domain;
+  return ::getsockopt(fd, SOL_SOCKET, SO_DOMAIN, &domain, &bytes) == 0 && listens != 0 && domain == AF_INET;
+}
+
 /// Binds and listens; the port is that of the socket, whoever made it.
 std::optional<Error> open_listener(const ModbusOptions& options, Fd& listener, int& port) {
   sockaddr_in local{};
   local.sin_family = AF_INET;
   if (options.listen_fd >= 0) {
     listener = Fd(options.listen_fd);
+    if (!listens_on_ipv4(listener.get()))
+      return fault("modbus.socket", options, "the socket handed over is no listening IPv4 socket",
+                   "ListenStream=0.0.0.0:502 in the socket unit: a port alone makes an IPv6 socket");
   } else {
     if (options.port < 0 || options.port > 65535 ||
         inet_pton(AF_INET, options.host.c_str(), &local.sin_addr) != 1)
@@ -137,13 +167,9 @@ ModbusServer::~ModbusServer() = default;
 Result<ModbusServer> ModbusServer::listen(const ModbusOptions& options) {
   auto state = std::make_unique<State>();
   state->options = options;
-  for (const std::string& text : options.allowed_clients) {
-    in_addr address{};
-    if (inet_pton(AF_INET, text.c_str(), &address) != 1)
-      return fault("modbus.address", options, "allowed client '" + text + "' is not an IPv4 address",
-                   "write dotted addresses");
-    state->allowed.push_back(address.s_addr);
-  }
+  auto allowed = addresses(options.allowed_clients, options);
+  if (!allowed.ok()) return allowed.error();
+  state->allowed = std::move(*allowed);
   if (auto error = open_listener(options, state->listener, state->port)) return *error;
   // The address is never used: connections are accepted here and lent to the library one frame at a time.
   state->context.reset(modbus_new_tcp("127.0.0.1", MODBUS_TCP_DEFAULT_PORT));
@@ -154,6 +180,19 @@ Result<ModbusServer> ModbusServer::listen(const ModbusOptions& options) {
   state->clients.reserve(places);
   state->waits.reserve(places + 1);
   return ModbusServer(std::move(state));
+}
+
+Status ModbusServer::set_access(const std::vector<std::string>& allowed_clients, int max_clients) {
+  auto allowed = addresses(allowed_clients, state_->options);
+  if (!allowed.ok()) return allowed.error();
+  state_->allowed = std::move(*allowed);
+  state_->options.max_clients = std::max(max_clients, 1);
+  std::erase_if(state_->clients, [&](const Client& client) { return !state_->allows(client.address); });
+  const auto places = static_cast<std::size_t>(state_->options.max_clients);
+  if (state_->clients.size() > places) state_->clients.resize(places);
+  state_->clients.reserve(places);
+  state_->waits.reserve(places + 1);
+  return Done{};
 }
 
 int ModbusServer::port() const noexcept { return state_->port; }
@@ -220,7 +259,7 @@ void ModbusServer::State::accept_all(HostTime at) noexcept {
       }
       return;
     }
-    const bool known = allowed.empty() || std::ranges::count(allowed, from.sin_addr.s_addr) != 0;
+    const bool known = allows(from.sin_addr.s_addr);
     // poll() and the library's select() both need small descriptors.
     if (!known || fd.get() >= FD_SETSIZE || !make_room(at)) {
       ++counters.refused_clients;
@@ -229,6 +268,7 @@ void ModbusServer::State::accept_all(HostTime at) noexcept {
     configure_client(fd.get());
     Client client;
     client.fd = std::move(fd);
+    client.address = from.sin_addr.s_addr;
     client.heard = at;
     clients.push_back(std::move(client));
   }
@@ -243,7 +283,7 @@ bool ModbusServer::State::spent(Client& client, HostTime at) noexcept {
 }
 
 bool ModbusServer::State::make_room(HostTime at) noexcept {
-  if (clients.size() < clients.capacity()) return true;
+  if (clients.size() < static_cast<std::size_t>(std::max(options.max_clients, 1))) return true;
   const auto idle = std::ranges::min_element(clients, {}, [](const Client& c) { return c.heard; });
   if (at - idle->heard < options.idle_before_eviction) return false;
   clients.erase(idle);

@@ -16,14 +16,21 @@ Error file_fault(const fs::path& path, const std::string& what) {
   return {"submit.file", path.string(), what, "name the job file and the files that it refers to"};
 }
 
-/// Copies the files into `staging`; the group may read them, because the daemon is another user.
-std::optional<Error> fill(const fs::path& staging, const std::map<std::string, fs::path>& sources) {
+/// What is dropped belongs to the spool's group, which may read and move it: the daemon is another user. Who
+/// is not in that group and not root cannot write the spool anyhow.
+void share(const fs::path& path, mode_t mode, gid_t group) {
+  [[maybe_unused]] const int left = ::chown(path.c_str(), static_cast<uid_t>(-1), group);
+  ::chmod(path.c_str(), mode);
+}
+
+std::optional<Error> fill(const fs::path& staging, const std::map<std::string, fs::path>& sources,
+                          gid_t group) {
   for (const auto& [name, source] : sources) {
     const fs::path target = staging / name;
     if (const int reason = copy_file_durably(source, target); reason != 0)
       return Error{"submit.spool", target.string(), std::strerror(reason),
                    "check the spool's rights and its disk"};
-    ::chmod(target.c_str(), 0660);
+    share(target, 0660, group);
   }
   sync_folder(staging);
   return std::nullopt;
@@ -54,9 +61,11 @@ Result<fs::path> submit_job(const fs::path& root, const fs::path& job_file, std:
   if (::mkdir(staging.c_str(), 0770) != 0)
     return Error{"submit.spool", staging.string(), std::strerror(errno),
                  "join the group that owns the spool"};
-  ::chmod(staging.c_str(), 0770);
+  struct stat spool {};
+  ::stat(incoming.c_str(), &spool);
+  share(staging, 0770, spool.st_gid);
   const fs::path target = incoming / name;
-  std::optional<Error> fault = fill(staging, sources);
+  std::optional<Error> fault = fill(staging, sources, spool.st_gid);
   if (!fault) {
     const int reason = rename_fresh(staging, target);
     if (reason == EEXIST || reason == ENOTEMPTY)

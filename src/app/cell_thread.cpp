@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "app/job_bundle.hpp"
+#include "app/log.hpp"
 #include "app/places.hpp"
 #include "weldcell/adapters/host_clock.hpp"
 #include "weldcell/app/initial_state.hpp"
@@ -107,6 +108,7 @@ void CellThread::feed(HostTime time, job::InputBody body) {
     story_->note_input(input);
   }
   if (const auto* cycle = std::get_if<job::EgmCycle>(&input.body)) watch(*cycle);
+  if (!outputs.empty()) label_log(cell_.status());
   dispatch(outputs);
   wiring_.wants_laser.store(cell_.wants_laser(), std::memory_order_relaxed);
   wiring_.takes_jobs.store(cell_.takes_jobs(), std::memory_order_relaxed);

@@ -106,7 +106,10 @@ int command_import(Arguments arguments) {
   if (*height < 0 || *radius < 0) return line.refuse("--height and --radius are millimetres above 0");
   request.options.height_mm = *height;
   request.options.edge_radius_mm = *radius;
+  std::string warning;
+  request.warning = &warning;
   const auto yaml = adapters::import_cad_yaml(request);
+  if (!warning.empty()) std::fprintf(stderr, "%s\n", warning.c_str());
   if (!yaml.ok()) return refuse(yaml.error().text());
   const auto read = files::parse_workpiece(*yaml, request.file);
   if (const auto* faults = std::get_if<files::Faults>(&read)) return refuse(files::text(*faults));

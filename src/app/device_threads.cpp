@@ -125,6 +125,10 @@ void run_plc(Wiring& wiring, adapters::ModbusServer& server) {
   while (!stopping(wiring)) {
     server.poll(50 * kMillisecond);
     wiring.beat(ThreadName::Plc);
+    for (const ModbusAccess& access : wiring.modbus_access.take_all()) {
+      const Status status = server.set_access(access.allow, access.max_clients);
+      if (!status.ok()) spdlog::error("{}", status.error().text());
+    }
     const HostTime now = adapters::now();
     while (const auto words = server.take_order()) {
       const wire::PlcOrder order = wire::decode_plc_order(*words, wiring.config.word_order);

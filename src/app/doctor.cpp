@@ -119,7 +119,7 @@ Ailments judge_kernel(const KernelFacts& kernel) {
   if (!kernel.isolated_cpus.empty()) {
     out.push_back(well("processors",
                        fmt::format("{}, of them kept for real time: {}", kernel.cpus, kernel.isolated_cpus)));
-  } else if (kernel.cpus < 2) {
+  } else if (kernel.cpus == 1) {
     out.push_back(warn("processors", "only one: localization and the robot's cycle share it",
                        "give the machine two or more"));
   } else {

@@ -4,6 +4,7 @@
 #include <Poco/SHA2Engine.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 
 #include "app/places.hpp"
@@ -51,7 +52,12 @@ Result<workpiece::Workpiece> load_workpiece(const job::JobOrder& order, const st
                    "send the right file, or correct 'revision'"};
     }
   }
-  if (is_cad(path)) return adapters::import_cad(cad_program(), path.string(), order.cad, cad_cache_dir);
+  if (is_cad(path)) {
+    std::string warning;
+    auto workpiece = adapters::import_cad(cad_program(), path.string(), order.cad, cad_cache_dir, &warning);
+    if (!warning.empty()) std::fprintf(stderr, "%s\n", warning.c_str());
+    return workpiece;
+  }
   auto read = files::read_workpiece_file(path.string());
   if (const auto* faults = std::get_if<files::Faults>(&read)) {
     return Error{"workpiece.file", "", files::text(*faults), ""};

@@ -1,7 +1,6 @@
 // weldcelld: the cell controller daemon. Reads its configuration, makes the threads, keeps spool and control
 // socket, and stops in order.
 #include <malloc.h>
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <sysexits.h>
 
@@ -13,6 +12,7 @@
 #include "app/command_line.hpp"
 #include "app/control.hpp"
 #include "app/device_threads.hpp"
+#include "app/log.hpp"
 #include "app/places.hpp"
 #include "app/spool_keeper.hpp"
 #include "app/threads.hpp"
@@ -27,6 +27,7 @@ namespace weldcell::app {
 namespace {
 
 volatile std::sig_atomic_t g_signal = 0;
+volatile std::sig_atomic_t g_reload = 0;
 
 constexpr const char* kUsage =
     "usage: weldcelld --config cell.yaml [--check] [--ports-file FILE]\n"
@@ -70,6 +71,48 @@ std::string arm_text(const files::CellConfig& config) {
   return text.ok() ? *text : std::string{};
 }
 
+/// The cell file's section `modbus`, and the socket that systemd may have opened for it.
+Result<adapters::ModbusOptions> modbus_options(const files::CellConfig& config) {
+  adapters::ModbusOptions options;
+  options.host = config.modbus.host;
+  options.port = config.modbus.port;
+  options.allowed_clients = config.modbus_allow;
+  options.max_clients = config.modbus_max_clients;
+  for (const adapters::ListenSocket& socket : adapters::listen_sockets()) {
+    if (options.listen_fd >= 0 || socket.name != "modbus")
+      return Error{"socket", "socket '" + socket.name + "' from systemd", "is not known here",
+                   "pass one, with FileDescriptorName=modbus"};
+    options.listen_fd = socket.fd;
+    // The socket may listen anywhere, whatever modbus.listen says.
+    if (config.modbus_allow.empty())
+      return Error{"socket", "modbus.allow", "is empty, and systemd opened the port for everybody",
+                   "name who may connect: allow: [<the PLC's address>]"};
+  }
+  return options;
+}
+
+/// SIGHUP: the cell file is read again; who may connect to Modbus counts from now on, everything else at the
+/// next start. A file that is not sound changes nothing.
+void reload(Wiring& wiring) {
+  adapters::notify_reloading();
+  auto read = files::read_cell_file(wiring.config.path);
+  if (const auto* faults = std::get_if<files::Faults>(&read)) {
+    spdlog::error("not reloaded, nothing changed: {}", files::text(*faults));
+  } else {
+    const auto& config = std::get<files::CellConfig>(read);
+    if (config.modbus_allow.empty() && !wiring.config.modbus_allow.empty()) {
+      spdlog::error("not reloaded: modbus.allow is empty now, the port would be open to everybody");
+      adapters::notify_ready("not reloaded");
+      return;
+    }
+    wiring.modbus_access.push({config.modbus_allow, config.modbus_max_clients});
+    spdlog::info("reloaded modbus.allow and modbus.max_clients; {}",
+                 config.text == wiring.config.text ? "the file is as it was at the start"
+                                                   : "whatever else changed counts after a restart");
+  }
+  adapters::notify_ready("reloaded");
+}
+
 Status write_ports(const std::string& path, const Wiring& wiring) {
   if (path.empty()) return Done{};
   return write_file_durably(path, fmt::format("{{\"egm\": {}, \"modbus\": {}}}\n", wiring.egm_port.load(),
@@ -99,12 +142,9 @@ int serve(const files::CellConfig& config, const std::string& ports_file) {
   const auto wiring = std::make_unique<Wiring>(config);
   auto egm = adapters::EgmSocket::bind(config.egm.host, config.egm.port, config.egm_peer);
   if (!egm.ok()) return fail(egm.error().text());
-  adapters::ModbusOptions modbus_options;
-  modbus_options.host = config.modbus.host;
-  modbus_options.port = config.modbus.port;
-  modbus_options.allowed_clients = config.modbus_allow;
-  modbus_options.max_clients = config.modbus_max_clients;
-  auto modbus = adapters::ModbusServer::listen(modbus_options);
+  const auto options = modbus_options(config);
+  if (!options.ok()) return refuse(options.error().text());
+  auto modbus = adapters::ModbusServer::listen(*options);
   if (!modbus.ok()) return fail(modbus.error().text());
   wiring->egm_port = egm->port();
   wiring->modbus_port = modbus->port();
@@ -124,6 +164,10 @@ int serve(const files::CellConfig& config, const std::string& ports_file) {
   adapters::notify_ready("waiting for a job");
   Watchdog watchdog;
   while (g_signal == 0) {
+    if (g_reload != 0) {
+      g_reload = 0;
+      reload(*wiring);
+    }
     keeper.step(50 * kMillisecond);
     control->poll(50 * kMillisecond);
     watchdog.step(*wiring, adapters::now());
@@ -165,14 +209,13 @@ int weldcelld(Arguments arguments) {
 int main(int argc, char** argv) {
   // Few arenas: the budget of the daemon is 100 MB resident.
   ::mallopt(M_ARENA_MAX, 2);
-  auto logger = spdlog::stderr_logger_mt("weldcelld");
-  logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
-  logger->flush_on(spdlog::level::info);
-  spdlog::set_default_logger(logger);
+  weldcell::app::start_log();
   struct sigaction action {};
   action.sa_handler = [](int signal) { weldcell::app::g_signal = signal; };
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
+  action.sa_handler = [](int) { weldcell::app::g_reload = 1; };
+  sigaction(SIGHUP, &action, nullptr);
   signal(SIGPIPE, SIG_IGN);
   try {
     return weldcell::app::weldcelld(weldcell::app::Arguments(const_cast<const char* const*>(argv) + 1,

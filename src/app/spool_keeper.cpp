@@ -22,7 +22,7 @@ constexpr Nanoseconds kCancelWait = 10 * kSecond;
 
 /// What the last process left behind in state.json.
 struct Left {
-  bool ended = false, accepted = false, begun = false;
+  bool ended = false, accepted = false, begun = false, welding = false;
 };
 
 Left read_left(const std::string& folder, job::JobArrived& arrived) {
@@ -32,7 +32,7 @@ Left read_left(const std::string& folder, job::JobArrived& arrived) {
   if (!json.is_object()) {
     // Nobody knows how far it came; the controller is asked before any arc.
     arrived.weld_begun = true;
-    return {false, false, true};
+    return {false, false, true, true};
   }
   const std::string last = json.value("state", "");
   arrived.seams_done = json.value("seams_done", 0);
@@ -40,7 +40,7 @@ Left read_left(const std::string& folder, job::JobArrived& arrived) {
   arrived.weld_begun = json.value("weld_begun", false);
   const bool before_start = last == "Idle" || last == "Importing" || last == "Planning" || last == "Ready";
   const bool begun = !before_start || arrived.seams_done > 0 || arrived.guidance_done || arrived.weld_begun;
-  return {last == "Done" || last == "Failed", last == "Done", begun};
+  return {last == "Done" || last == "Failed", last == "Done", begun, last == "Welding"};
 }
 
 /// Fewer than these of a job's own faults; everything else is the disk's or the folder's.
@@ -78,6 +78,13 @@ void SpoolKeeper::find_interrupted() {
       continue;
     }
     job->arrived.interrupted = left.begun;
+    if (left.welding) {
+      spdlog::warn(
+          "job '{}' was left while it welded: RAPID may weld on at this moment, weldcelld has not stopped "
+          "it; stop it on "
+          "the FlexPendant if it must not; Resume and Abort stop it too",
+          found.name);
+    }
     if (left.begun) {
       interrupted_.push_back(std::move(job));
     } else {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "app/mailbox.hpp"
 #include "weldcell/app/egm_watch.hpp"
@@ -55,6 +56,12 @@ struct Shown {
   std::string folder;
 };
 
+/// Who may speak Modbus, as it was read anew.
+struct ModbusAccess {
+  std::vector<std::string> allow;
+  int max_clients = 0;
+};
+
 /// A job that is over: main moves its folder.
 struct EndedJob {
   std::string id;
@@ -82,6 +89,7 @@ struct Wiring {
   Mailbox<std::function<void()>> work{16};        ///< solver; full cannot happen: one order a job step
   Mailbox<Shown> shown{16};                       ///< full: a picture is skipped
   Mailbox<EndedJob> ended{64};
+  Mailbox<ModbusAccess> modbus_access{4};  ///< full: the plc thread hangs, and the watchdog says so
   Mailbox<std::shared_ptr<const ActiveJob>> returned{4};  ///< full cannot happen: one job at a time
 
   std::atomic<const plan::MotionPlan*> offered_plan{nullptr};  ///< cell -> egm; the cell keeps the plan alive

@@ -2,7 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
 #include <csignal>
+#include <cstddef>
 
 namespace weldcell::adapters {
 namespace {
@@ -56,6 +64,34 @@ TEST(LimitedChild, HasLimitsOnMemoryFilesAndEnvironment) {
   EXPECT_NE(run("f=/tmp/weldcell-child-$$; (echo x > $f); r=$?; rm -f $f; exit $r").exit_code, 0);
   EXPECT_EQ(run("cat; echo \"[$HOME]\"").out, "[]\n");
   EXPECT_EQ(run("ls /proc/self/fd | wc -l").out, "4\n");
+}
+
+/// From now on this process and its children are refused unshare(2).
+void refuse_unshare() {
+  sock_filter program[] = {
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_unshare, 0, 1),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM),
+      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+  };
+  const sock_fprog all{sizeof program / sizeof program[0], program};
+  if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
+      ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &all) != 0)
+    ::_exit(99);
+}
+
+TEST(LimitedChild, TellsWhetherItsNetworkWasCut) {
+  const ChildOutcome here = run("cat /proc/net/dev | wc -l");
+  if (here.network_errno == 0) {
+    EXPECT_EQ(here.out, "3\n") << "two lines of heading and lo";
+  }
+  EXPECT_EXIT(
+      {
+        refuse_unshare();
+        const ChildOutcome o = run("echo read");
+        ::_exit(o.out == "read\n" ? o.network_errno : 98);
+      },
+      ::testing::ExitedWithCode(EPERM), "");
 }
 
 TEST(LimitedChild, AProgramThatIsNotThereEndsWith127) {

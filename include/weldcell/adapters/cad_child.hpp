@@ -22,6 +22,9 @@ struct CadRequest {
   std::string plane;      ///< "" = xy; xy | xz | yz
   std::string cache_dir;  ///< "" = no cache; made when absent
   int timeout_s = kCadTimeoutS;
+  /// Not null: gets a sentence when the child could not be cut off from the network; it has read all the
+  /// same.
+  std::string* warning = nullptr;
 };
 
 /// The workpiece file as text. Same bytes and options give the cached answer without a child.
@@ -29,9 +32,11 @@ struct CadRequest {
 /// "cad.crashed", "cad.output".
 Result<std::string> import_cad_yaml(const CadRequest& request);
 Result<std::string> import_cad_yaml(const std::string& program, const std::string& cad_file,
-                                    const job::CadImport& options, const std::string& cache_dir);
+                                    const job::CadImport& options, const std::string& cache_dir,
+                                    std::string* warning = nullptr);
 /// The same, read. Its name is the CAD file's stem.
 Result<workpiece::Workpiece> import_cad(const std::string& program, const std::string& cad_file,
-                                        const job::CadImport& options, const std::string& cache_dir);
+                                        const job::CadImport& options, const std::string& cache_dir,
+                                        std::string* warning = nullptr);
 
 }  // namespace weldcell::adapters

@@ -55,6 +55,9 @@ class ModbusServer {
 
   int port() const noexcept;
   int clients() const noexcept;
+  /// Who may connect from now on, at most how many; a client that may no longer is closed. "modbus.address":
+  /// not an IPv4 address, nothing changes.
+  Status set_access(const std::vector<std::string>& allowed_clients, int max_clients);
   /// What the PLC reads from now on.
   void set_status(const PlcStatusWords& words) noexcept;
   /// The block that the PLC writes, as it stands.

@@ -163,6 +163,22 @@ TEST_F(Spool, SubmitDropsAWholeFolder) {
   for (const auto& left : fs::directory_iterator(root_ / "incoming")) ADD_FAILURE() << left.path();
 }
 
+TEST_F(Spool, WhatIsSubmittedBelongsToTheSpoolsGroup) {
+  if (::geteuid() != 0) GTEST_SKIP() << "giving a folder to another group wants root";
+  constexpr gid_t kGroup = 4242;
+  SpoolDir spool = open();
+  ASSERT_EQ(::chown((root_ / "incoming").c_str(), static_cast<uid_t>(-1), kGroup), 0);
+  write("elsewhere/demo.yaml", kJob);
+  const auto dropped = submit_job(root_, root_ / "elsewhere/demo.yaml", {});
+  ASSERT_TRUE(dropped.ok()) << dropped.error().text();
+  for (const fs::path& path : {*dropped, *dropped / "demo.yaml"}) {
+    struct stat facts {};
+    ASSERT_EQ(::stat(path.c_str(), &facts), 0);
+    EXPECT_EQ(facts.st_gid, kGroup) << path;
+    EXPECT_EQ(facts.st_mode & 0777, fs::is_directory(path) ? 0770U : 0660U) << path;
+  }
+}
+
 TEST_F(Spool, AFolderCopiedFileByFileIsWaitedFor) {
   SpoolDir spool = open();
   fs::create_directory(root_ / "incoming/demo");
