@@ -48,21 +48,18 @@ check "the drawing's reader was cut off from the network" not journal_has "netwo
 weldcell operate arm; weldcell operate start
 check "it scans" until_true 600 status_has '"state":"Scanning"'
 sleep 4
+# What the simulated controller says of its joints, asked over RWS.
+joints() { curl -s --digest -u "Default User:$(cat "$share/demo/rws-password")" http://127.0.0.1:8080/rw/motionsystem/mechunits/ROB_1/jointtarget | grep -o '<span class="rax_[1-6]">[^<]*'; }
+one=$(joints); sleep 0.3; two=$(joints)
+check "six joints are read" test "$(wc -l <<<"$one")" = 6
+check "the robot moves" test "$one" != "$two"
 check "systemctl stop ends it" systemctl stop weldcelld
+one=$(joints); sleep 0.5; two=$(joints)
+check "the robot rests as soon as it has ended" test "$one" = "$two"
 check "by itself, not by a kill" show_is Result success
 check "journalctl JOB_ID=booted finds lines" journal_has . JOB_ID=booted
 check "journalctl STATE=Scanning finds lines of it" journal_has . JOB_ID=booted STATE=Scanning
 check "journalctl FAULT=50 finds the stop" journal_has . JOB_ID=booted FAULT=50
-# The robot's poses as they came from the controller: moving in the scan, at rest at the end of the record.
-record=$(ls -t /var/spool/weldcell/active/booted/record*.mcap | head -1)
-weldcell dump "$record" --topic poses >/srv/poses.csv
-check "the record has its poses" test "$(wc -l </srv/poses.csv)" -gt 500
-# turned FROM TO: sum of all joints' travel in degrees from so many cycles before the end to so many.
-turned() { awk -F, -v from="$1" -v to="$2" 'NR > 1 { n = NR; for (c = 4; c <= 9; ++c) q[n, c] = $c }
-  END { for (i = n - from + 2; i <= n - to; ++i) for (c = 4; c <= 9; ++c) { e = q[i, c] - q[i-1, c]; d += e < 0 ? -e : e } printf "%.4f", d }' /srv/poses.csv; }
-echo "      joints turned $(turned 1000 500) deg in 500 cycles of the scan, $(turned 20 0) deg in the last 20"
-check "the robot moved, and came to rest before the end" awk -v a="$(turned 1000 0)" -v b="$(turned 20 0)" 'BEGIN { exit !(a > 1 && b < 0.01) }'
-
 check "it starts again" systemctl start weldcelld
 check "and finds the job interrupted, not armed" until_true 100 status_has '"state":"Interrupted"'
 check "not armed" status_has '"armed":false'
