@@ -1,23 +1,29 @@
 #include "weldcell/app/virtual_cell.hpp"
 
 #include <algorithm>
+#include <array>
 #include <deque>
 
 #include "weldcell/app/robot_runner.hpp"
 #include "weldcell/base/units.hpp"
 #include "weldcell/job/work_order.hpp"
 #include "weldcell/robot/egm_session.hpp"
+#include "weldcell/sim/fault_schedule.hpp"
 #include "weldcell/sim/laser.hpp"
 
 namespace weldcell::app {
 
 namespace {
 
+constexpr std::uint64_t kTickCycles = 5, kRobotCycles = 12, kPersonCycles = 50, kLookCycles = 250;
+
 /// The simulated controller's RWS without a socket.
 class DirectTransport final : public ports::HttpTransport {
  public:
   explicit DirectTransport(sim::Controller& controller) : controller_(&controller) {}
   Result<ports::HttpReply> exchange(const ports::HttpRequest& request) override {
+    if (controller_->rws_silent())
+      return Error{"http.connection", request.path, "the connection was refused", "check the network"};
     return controller_->handle_rws(request);
   }
 
@@ -25,183 +31,276 @@ class DirectTransport final : public ports::HttpTransport {
   sim::Controller* controller_;
 };
 
-class VirtualCell {
- public:
-  VirtualCell(const files::CellConfig& config, const sim::Scene& scene, const VirtualJob& job)
-      : scene_(scene),
-        job_(job),
-        setup_(std::make_shared<cell::CellSetup>(config.setup)),
-        cell_(config.setup, config.laser_format, false),
-        session_(config.setup),
-        controller_(scene, config.setup.arm),
-        laser_(scene),
-        transport_(controller_),
-        rws_(transport_,
-             controller_.rws_generation() == 2 ? wire::RwsGeneration::Two : wire::RwsGeneration::One),
-        runner_(rws_, config.rws_task, job.resident_module) {}
+/// What ends when the process ends.
+struct Daemon {
+  Daemon(const files::CellConfig& config, const VirtualJob& job, sim::Controller& controller)
+      : cell(config.setup, config.laser_format, job.plc),
+        session(config.setup),
+        transport(controller),
+        rws(transport,
+            controller.rws_generation() == 2 ? wire::RwsGeneration::Two : wire::RwsGeneration::One),
+        runner(rws, config.rws_task, job.resident_module) {}
 
-  VirtualOutcome run() {
-    feed(job::LinkChange{job::Link::Laser, true, {}});
-    feed(job::LinkChange{job::Link::Rws, true, {}});
-    job::JobArrived arrived;
-    arrived.id = job_.order.name;
-    arrived.order = job_.order;
-    feed(arrived);
-    const auto cycle = static_cast<Nanoseconds>(scene_.controller.cycle_ms * 1e6);
-    while (!outcome_.finished && seconds(now_.ns) < job_.give_up_s) {
-      now_ = now_ + cycle;
-      advance();
-    }
-    return summary();
-  }
-
- private:
-  void feed(job::InputBody body) { feed(now_, std::move(body)); }
-
-  void feed(HostTime time, job::InputBody body) {
-    job::Outputs outputs = cell_.step({time, std::move(body)});
-    for (job::Output& output : outputs) dispatch(output);
-  }
-
-  void dispatch(job::Output& output) {
-    if (const auto order = job::work_order(output, cell_, setup_)) {
-      answers_.push_back(job::run(*order));
-    } else if (std::holds_alternative<job::ImportRequest>(output)) {
-      answers_.push_back(job::ImportDone{job_.workpiece});
-    } else if (const auto* request = std::get_if<job::RobotRequest>(&output)) {
-      requests_.push_back(*request);
-    } else if (const auto* motion = std::get_if<job::StartMotion>(&output)) {
-      plans_.push_back(motion->plan);
-      session_.offer(plans_.back().get());
-      outcome_.scan_s += motion->plan->duration_s();
-    } else if (std::holds_alternative<job::StopMotion>(output)) {
-      session_.request_stop();
-    } else if (const auto* arm = std::get_if<job::SetArmed>(&output)) {
-      session_.set_armed(arm->armed);
-    } else if (const auto* finish = std::get_if<job::FinishJob>(&output)) {
-      outcome_.finished = true;
-      outcome_.accepted = finish->accepted;
-      outcome_.verdict = finish->verdict;
-      outcome_.reason = finish->reason;
-    } else if (const auto* event = std::get_if<job::LogEvent>(&output)) {
-      outcome_.log.push_back(event->text);
-    }
-  }
-
-  void advance() {
-    controller_.step(now_);
-    if (const auto datagram = controller_.egm_datagram()) exchange_egm(*datagram);
-    deliver_laser();
-    while (!answers_.empty()) {
-      job::InputBody body = std::move(answers_.front());
-      answers_.pop_front();
-      feed(std::move(body));
-    }
-    ++cycles_;
-    if (cycles_ % 5 == 0) feed(job::Tick{});
-    if (cycles_ % 12 == 0) serve_robot();
-    if (cycles_ % 50 == 0) act_as_person();
-  }
-
-  void exchange_egm(const std::vector<std::byte>& datagram) {
-    // The wire takes a little, each time a little differently, but the same at every run.
-    jitter_ = jitter_ * 6364136223846793005ULL + 1442695040888963407ULL;
-    const HostTime arrival = now_ + 150 * kMicrosecond + static_cast<Nanoseconds>((jitter_ >> 33) % 200'000);
-    std::array<std::byte, wire::kEgmMaxBytes> reply{};
-    const std::size_t size = session_.on_datagram(datagram, arrival, reply);
-    const std::span<const std::byte> sent(reply.data(), size);
-    if (size > 0) controller_.on_egm_datagram(sent);
-    feed(arrival, job::EgmCycle{datagram, {sent.begin(), sent.end()}, session_.report()});
-  }
-
-  void deliver_laser() {
-    const auto pose_at = [this](HostTime t) {
-      return kinematics::forward(setup_->arm, controller_.joints_at(t));
-    };
-    for (sim::LaserBlock& block : laser_.advance(now_, pose_at)) wire_.push_back(std::move(block));
-    while (!wire_.empty() && wire_.front().arrival <= now_) {
-      if (cell_.wants_laser()) feed(wire_.front().arrival, job::LaserBytes{std::move(wire_.front().bytes)});
-      wire_.pop_front();
-    }
-  }
-
-  void serve_robot() {
-    if (!runner_.busy() && !requests_.empty()) {
-      runner_.begin(requests_.front(), now_);
-      requests_.pop_front();
-    }
-    if (const auto reply = runner_.step(now_)) feed(*reply);
-  }
-
-  void act_as_person() {
-    const auto order = [this](wire::PlcCommand command) { feed(job::OperatorCommand{command, "person"}); };
-    switch (cell_.status().state) {
-      case job::State::Ready:
-        order(wire::PlcCommand::Arm);
-        order(wire::PlcCommand::Start);
-        break;
-      case job::State::Placing:
-        order(wire::PlcCommand::Confirm);
-        break;
-      case job::State::Faulted:
-        order(wire::PlcCommand::Abort);
-        break;
-      default:
-        break;
-    }
-  }
-
-  VirtualOutcome summary() {
-    outcome_.truth = scene_.truth;
-    outcome_.virtual_s = seconds(now_.ns);
-    outcome_.passes = cell_.status().pass;
-    if (!outcome_.finished)
-      outcome_.reason = "gave up in state " + std::string(job::to_string(cell_.status().state));
-    if (const auto solution = cell_.solution()) {
-      const Vec2& centroid = cell_.prepared()->outline.centroid;
-      outcome_.solution = solution;
-      outcome_.cause = solution->found.cause;
-      outcome_.found = solution->found.pose;
-      outcome_.centroid_error_mm = solution->found.pose * centroid - scene_.truth * centroid;
-      outcome_.theta_error_rad = wrap_pi(solution->found.pose.theta_rad - scene_.truth.theta_rad);
-      outcome_.certificates = solution->certificates;
-      outcome_.points = solution->found.points;
-    }
-    if (!outcome_.accepted) {
-      if (const auto events = rws_.event_log(5); events.ok()) {
-        for (const auto& e : *events)
-          outcome_.log.push_back("controller's log: " + std::to_string(e.code) + " " + e.title + ": " +
-                                 e.description);
-      }
-    }
-    outcome_.seam_error_mm = sim::seam_errors_mm(scene_, controller_.weld_traces());
-    return outcome_;
-  }
-
-  const sim::Scene& scene_;
-  const VirtualJob& job_;
-  std::shared_ptr<const cell::CellSetup> setup_;
-  job::Cell cell_;
-  robot::EgmSession session_;
-  sim::Controller controller_;
-  sim::LaserDevice laser_;
-  DirectTransport transport_;
-  adapters::RwsClient rws_;
-  RobotRunner runner_;
-
-  HostTime now_;
-  std::uint64_t cycles_ = 0, jitter_ = 1;
-  std::deque<job::InputBody> answers_;
-  std::deque<job::RobotRequest> requests_;
-  std::deque<sim::LaserBlock> wire_;
-  std::vector<std::shared_ptr<const plan::MotionPlan>> plans_;
-  VirtualOutcome outcome_;
+  job::Cell cell;
+  robot::EgmSession session;
+  DirectTransport transport;
+  adapters::RwsClient rws;
+  RobotRunner runner;
+  std::deque<job::InputBody> answers;
+  std::deque<job::RobotRequest> requests;
+  std::vector<std::shared_ptr<const plan::MotionPlan>> plans;
 };
 
 }  // namespace
 
+struct VirtualCell::State {
+  State(const files::CellConfig& config_, const sim::Scene& scene_, const VirtualJob& job_)
+      : config(config_),
+        scene(scene_),
+        job(job_),
+        setup(std::make_shared<cell::CellSetup>(config_.setup)),
+        controller(scene_, config_.setup.arm),
+        laser(scene_),
+        faults(scene_.faults) {}
+
+  void begin(bool interrupted);
+  void feed(job::InputBody body) { feed(now, std::move(body)); }
+  void feed(HostTime time, job::InputBody body);
+  void dispatch(job::Output& output);
+  void advance();
+  void exchange_egm(const std::vector<std::byte>& datagram);
+  void deliver_laser();
+  void serve_robot();
+  void watch_links();
+  void note_armed();
+
+  const files::CellConfig& config;
+  const sim::Scene& scene;
+  const VirtualJob& job;
+  std::shared_ptr<const cell::CellSetup> setup;
+  sim::Controller controller;
+  sim::LaserDevice laser;
+  sim::FaultSchedule faults;
+  std::unique_ptr<Daemon> daemon;
+  job::SaveState saved;  ///< what a disk would hold
+
+  HostTime now;
+  std::uint64_t cycles = 0, jitter = 1;
+  bool laser_up = false, rws_up = false, plc_beats = false, was_armed = true;
+  std::deque<sim::LaserBlock> wire;
+  std::vector<sim::MotionSpan> unarmed;
+  VirtualOutcome outcome;
+};
+
+void VirtualCell::State::begin(bool interrupted) {
+  daemon = std::make_unique<Daemon>(config, job, controller);
+  laser_up = laser.connected();
+  rws_up = !controller.rws_silent();
+  if (laser_up) feed(job::LinkChange{job::Link::Laser, true, {}});
+  if (rws_up) feed(job::LinkChange{job::Link::Rws, true, {}});
+  plc_beats = job.plc;
+  if (plc_beats) feed(job::LinkChange{job::Link::Plc, true, {}});
+  job::JobArrived arrived;
+  arrived.id = job.order.name;
+  arrived.order = job.order;
+  arrived.interrupted = interrupted;
+  if (interrupted) {
+    arrived.seams_done = saved.seams_done;
+    arrived.guidance_done = saved.guidance_done;
+    arrived.weld_begun = saved.weld_begun;
+  }
+  feed(arrived);
+}
+
+void VirtualCell::State::feed(HostTime time, job::InputBody body) {
+  job::Outputs outputs = daemon->cell.step({time, std::move(body)});
+  for (job::Output& output : outputs) dispatch(output);
+}
+
+void VirtualCell::State::dispatch(job::Output& output) {
+  if (const auto order = job::work_order(output, daemon->cell, setup)) {
+    daemon->answers.push_back(job::run(*order));
+  } else if (std::holds_alternative<job::ImportRequest>(output)) {
+    daemon->answers.push_back(job::ImportDone{job.workpiece});
+  } else if (const auto* request = std::get_if<job::RobotRequest>(&output)) {
+    daemon->requests.push_back(*request);
+  } else if (const auto* motion = std::get_if<job::StartMotion>(&output)) {
+    daemon->plans.push_back(motion->plan);
+    daemon->session.offer(motion->plan.get());
+    outcome.scan_s += motion->plan->duration_s();
+  } else if (std::holds_alternative<job::StopMotion>(output)) {
+    daemon->session.request_stop();
+  } else if (const auto* arm = std::get_if<job::SetArmed>(&output)) {
+    daemon->session.set_armed(arm->armed);
+  } else if (const auto* state = std::get_if<job::SaveState>(&output)) {
+    saved = *state;
+  } else if (const auto* finish = std::get_if<job::FinishJob>(&output)) {
+    outcome.finished = true;
+    outcome.accepted = finish->accepted;
+    outcome.verdict = finish->verdict;
+    outcome.reason = finish->reason;
+  } else if (const auto* event = std::get_if<job::LogEvent>(&output)) {
+    outcome.log.push_back(event->text);
+  }
+}
+
+void VirtualCell::State::advance() {
+  now = now + static_cast<Nanoseconds>(scene.controller.cycle_ms * 1e6);
+  for (const sim::TimedFault& fault : faults.due(now, controller)) {
+    if (!laser.inject(fault.kind, fault.duration_s)) controller.inject(fault.kind, fault.duration_s);
+  }
+  controller.step(now);
+  if (const auto datagram = controller.egm_datagram(); datagram && daemon) exchange_egm(*datagram);
+  deliver_laser();
+  ++cycles;
+  if (daemon) {
+    watch_links();
+    while (!daemon->answers.empty()) {
+      job::InputBody body = std::move(daemon->answers.front());
+      daemon->answers.pop_front();
+      feed(std::move(body));
+    }
+    if (cycles % kTickCycles == 0) feed(job::Tick{});
+    if (cycles % kRobotCycles == 0) serve_robot();
+  }
+  note_armed();
+}
+
+void VirtualCell::State::exchange_egm(const std::vector<std::byte>& datagram) {
+  // The wire takes a little, each time a little differently, but the same at every run.
+  jitter = jitter * 6364136223846793005ULL + 1442695040888963407ULL;
+  const HostTime arrival = now + 150 * kMicrosecond + static_cast<Nanoseconds>((jitter >> 33) % 200'000);
+  std::array<std::byte, wire::kEgmMaxBytes> reply{};
+  const std::size_t size = daemon->session.on_datagram(datagram, arrival, reply);
+  const std::span<const std::byte> sent(reply.data(), size);
+  if (size > 0) controller.on_egm_datagram(sent);
+  feed(arrival, job::EgmCycle{datagram, {sent.begin(), sent.end()}, daemon->session.report()});
+}
+
+void VirtualCell::State::deliver_laser() {
+  const auto pose_at = [this](HostTime t) {
+    return kinematics::forward(setup->arm, controller.joints_at(t));
+  };
+  for (sim::LaserBlock& block : laser.advance(now, pose_at)) wire.push_back(std::move(block));
+  while (!wire.empty() && wire.front().arrival <= now) {
+    if (daemon && daemon->cell.wants_laser())
+      feed(wire.front().arrival, job::LaserBytes{std::move(wire.front().bytes)});
+    wire.pop_front();
+  }
+}
+
+void VirtualCell::State::serve_robot() {
+  RobotRunner& runner = daemon->runner;
+  auto& requests = daemon->requests;
+  // As the daemon's own thread has it: a stop never waits behind a move, a move does behind a stop.
+  if (!requests.empty() && (!runner.busy() || requests.front().task == job::RobotTask::Stop)) {
+    runner.begin(requests.front(), now);
+    requests.pop_front();
+  }
+  if (const auto reply = runner.step(now)) feed(*reply);
+}
+
+void VirtualCell::State::watch_links() {
+  if (laser.connected() != laser_up) {
+    laser_up = !laser_up;
+    feed(job::LinkChange{job::Link::Laser, laser_up, laser_up ? "" : "closed by the sensor"});
+  }
+  if (cycles % kLookCycles != 0) return;
+  const auto state = daemon->rws.controller_state();
+  if (state.ok() == rws_up) return;
+  rws_up = !rws_up;
+  feed(job::LinkChange{job::Link::Rws, rws_up, rws_up ? "" : state.error().text()});
+}
+
+void VirtualCell::State::note_armed() {
+  const bool armed = daemon && daemon->cell.status().armed;
+  if (!armed && was_armed) unarmed.push_back({seconds(now.ns), 0});
+  if (!armed) unarmed.back().end_s = seconds(now.ns);
+  was_armed = armed;
+}
+
+VirtualCell::VirtualCell(const files::CellConfig& config, const sim::Scene& scene, const VirtualJob& job)
+    : state_(std::make_unique<State>(config, scene, job)) {
+  state_->begin(false);
+}
+VirtualCell::~VirtualCell() = default;
+
+void VirtualCell::advance() { state_->advance(); }
+double VirtualCell::now_s() const { return seconds(state_->now.ns); }
+bool VirtualCell::finished() const { return state_->outcome.finished; }
+bool VirtualCell::daemon_runs() const { return state_->daemon != nullptr; }
+const job::CellStatus& VirtualCell::status() const { return state_->daemon->cell.status(); }
+sim::Controller& VirtualCell::controller() { return state_->controller; }
+std::vector<sim::MotionSpan> VirtualCell::unarmed() const { return state_->unarmed; }
+
+std::string VirtualCell::order(wire::PlcCommand command) {
+  state_->feed(job::OperatorCommand{command, "person"});
+  const std::string refusal = state_->daemon->cell.refusal();
+  state_->note_armed();
+  return refusal;
+}
+
+void VirtualCell::act_as_person() {
+  if (status().state == job::State::Ready) {
+    order(wire::PlcCommand::Arm);
+    order(wire::PlcCommand::Start);
+  } else if (status().state == job::State::Placing) {
+    order(wire::PlcCommand::Confirm);
+  }
+}
+
+void VirtualCell::kill_daemon() {
+  state_->daemon.reset();
+  state_->note_armed();
+}
+
+void VirtualCell::start_daemon() { state_->begin(true); }
+
+void VirtualCell::set_plc_heartbeat(bool up) {
+  if (up == state_->plc_beats) return;
+  state_->plc_beats = up;
+  state_->feed(job::LinkChange{job::Link::Plc, up, up ? "" : "heartbeat stands still"});
+}
+
+VirtualOutcome VirtualCell::outcome() const {
+  State& s = *state_;
+  VirtualOutcome out = s.outcome;
+  out.truth = s.scene.truth;
+  out.virtual_s = now_s();
+  out.seam_error_mm = sim::seam_errors_mm(s.scene, s.controller.weld_traces());
+  if (!s.daemon) return out;
+  const job::Cell& cell = s.daemon->cell;
+  out.passes = cell.status().pass;
+  if (!out.finished) out.reason = "gave up in state " + std::string(job::to_string(cell.status().state));
+  if (const auto solution = cell.solution()) {
+    const Vec2& centroid = cell.prepared()->outline.centroid;
+    out.solution = solution;
+    out.cause = solution->found.cause;
+    out.found = solution->found.pose;
+    out.centroid_error_mm = solution->found.pose * centroid - s.scene.truth * centroid;
+    out.theta_error_rad = wrap_pi(solution->found.pose.theta_rad - s.scene.truth.theta_rad);
+    out.certificates = solution->certificates;
+    out.points = solution->found.points;
+  }
+  if (!out.accepted) {
+    if (const auto events = s.daemon->rws.event_log(5); events.ok()) {
+      for (const auto& e : *events)
+        out.log.push_back("controller's log: " + std::to_string(e.code) + " " + e.title + ": " +
+                          e.description);
+    }
+  }
+  return out;
+}
+
 VirtualOutcome run_virtual(const files::CellConfig& config, const sim::Scene& scene, const VirtualJob& job) {
-  return VirtualCell(config, scene, job).run();
+  VirtualCell cell(config, scene, job);
+  for (std::uint64_t cycle = 1; !cell.finished() && cell.now_s() < job.give_up_s; ++cycle) {
+    cell.advance();
+    if (cycle % kPersonCycles != 0 || cell.finished()) continue;
+    cell.act_as_person();
+    if (cell.status().state == job::State::Faulted) cell.order(wire::PlcCommand::Abort);
+  }
+  return cell.outcome();
 }
 
 }  // namespace weldcell::app

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "sim/controller_state.hpp"
 #include "sim/rws_handler.hpp"
@@ -17,7 +16,8 @@ constexpr std::size_t kMaxEvents = 1000;
 constexpr int kStatementsPerCycle = 64;
 constexpr double kBrakeTime_s = 0.15;
 constexpr double kTraceStep_mm = 0.2;
-constexpr double kRestart_s = 5;
+constexpr double kMoving_rad = 1e-6;  // in a cycle: less is rest
+constexpr double kPause_s = 0.1;      // a shorter rest does not end a motion
 }  // namespace
 
 const char* to_string(PanelState state) {
@@ -135,30 +135,6 @@ void ControllerState::start_ramp(double duration_s) {
   ramp_left_s = ramp_total_s = moving ? std::max(duration_s, cycle_s) : cycle_s;
 }
 
-void ControllerState::set_auto(bool automatic) {
-  if (automatic == truth.auto_mode) return;
-  truth.auto_mode = automatic;
-  manual_full_speed = false;
-  rmmp = {};
-  stop_program("operating mode changed");
-  if (panel == PanelState::MotorsOn) set_panel(PanelState::MotorsOff);
-  log(1, automatic ? 10017 : 10015, automatic ? "Automatic mode confirmed" : "Manual mode selected");
-}
-
-void ControllerState::restart(double duration_s) {
-  stop_program("controller restart");
-  set_panel(PanelState::MotorsOff);
-  egm.end();
-  egm_interrupted = false;
-  task.clear_pointer();
-  mastership.clear();
-  mastership_ids.clear();
-  rmmp = {};
-  rapid_state_unknown = truth.rapid_state_lost;
-  ++restarts;
-  fault_until_s["restart"] = seconds(now.ns) + (duration_s > 0 ? duration_s : kRestart_s);
-}
-
 std::vector<std::pair<std::string, double>> ControllerState::signals() {
   std::vector<std::pair<std::string, double>> out;
   for (const char* name :
@@ -259,6 +235,15 @@ void ControllerState::record_weld() {
   if (trace.empty() || (trace.back() - tcp).norm() >= kTraceStep_mm) trace.push_back(tcp);
 }
 
+void ControllerState::record_motion(const Joints& before) {
+  double most = 0;
+  for (std::size_t i = 0; i < 6; ++i) most = std::max(most, std::abs(servo.posture()[i] - before[i]));
+  if (most <= kMoving_rad) return;
+  const double end_s = seconds(now.ns), begin_s = end_s - cycle_s;
+  if (motions.empty() || begin_s > motions.back().end_s + kPause_s) motions.push_back({begin_s, end_s});
+  motions.back().end_s = end_s;
+}
+
 std::vector<std::byte> ControllerState::egm_frame() {
   EgmFrame frame;
   // The posture was read out one cycle before the message leaves.
@@ -276,26 +261,16 @@ std::vector<std::byte> ControllerState::egm_frame() {
 
 void ControllerState::step(HostTime t) {
   now = t;
-  for (auto fault = fault_until_s.begin(); fault != fault_until_s.end();) {
-    if (seconds(now.ns) < fault->second) {
-      ++fault;
-      continue;
-    }
-    if (fault->first == "estop") set_panel(PanelState::EmergencyStopReset);
-    if (fault->first == "guardstop") set_panel(PanelState::MotorsOff);
-    if (fault->first == "manual") set_auto(true);
-    if (fault->first == "restart") {
-      started_at = now;
-      log(1, 10002, "Controller has been restarted");
-    }
-    fault = fault_until_s.erase(fault);
-  }
+  end_faults();
+  move_pointer();
   if (task.running()) {
     run_time_s += cycle_s;
     task.run(kStatementsPerCycle);
   }
   move_reference();
+  const Joints before = servo.posture();
   servo.step(now, reference);
+  record_motion(before);
   record_weld();
   datagram.reset();
   if (egm.frame_due() && !fault_until_s.contains("egm_silence") && !restarting()) datagram = egm_frame();
@@ -334,33 +309,6 @@ const Joints& Controller::joints() const { return state_->servo.posture(); }
 Joints Controller::joints_at(HostTime t) const { return state_->servo.posture_at(t); }
 const std::vector<WeldTrace>& Controller::weld_traces() const { return state_->welds; }
 
-bool Controller::inject(const std::string& fault, double duration_s) {
-  ControllerState& s = *state_;
-  const double until =
-      duration_s > 0 ? seconds(s.now.ns) + duration_s : std::numeric_limits<double>::infinity();
-  if (fault == "estop") {
-    s.set_panel(PanelState::EmergencyStop);
-    s.fault_until_s[fault] = until;
-  } else if (fault == "guardstop") {
-    s.set_panel(PanelState::GuardStop);
-    s.fault_until_s[fault] = until;
-  } else if (fault == "motors_off") {
-    s.set_panel(PanelState::MotorsOff);
-  } else if (fault == "program_stop") {
-    s.stop_program("stopped at the pendant");
-  } else if (fault == "manual") {
-    s.set_auto(false);
-    if (duration_s > 0) s.fault_until_s[fault] = until;
-  } else if (fault == "restart") {
-    s.restart(duration_s);
-  } else if (fault == "egm_silence" || fault == "rws_503") {
-    s.fault_until_s[fault] = until;
-  } else {
-    return false;
-  }
-  return true;
-}
-
 Status Controller::load_module(const std::string& text) {
   if (auto loaded = state_->memory.load(text, true); !loaded) return loaded.error();
   return Done{};
@@ -370,6 +318,11 @@ std::optional<RwsObserved> Controller::observe_rws(const std::string& uri) {
   return rws_observed(*state_, uri);
 }
 int Controller::rws_generation() const { return state_->generation; }
+bool Controller::arc_on() const { return state_->arc_on; }
+const std::vector<MotionSpan>& Controller::motions() const { return state_->motions; }
+bool Controller::rws_silent() const {
+  return state_->restarting() || state_->fault_until_s.contains("rws_silence");
+}
 bool Controller::restarting() const { return state_->restarting(); }
 std::uint64_t Controller::restarts() const { return state_->restarts; }
 

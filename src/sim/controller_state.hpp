@@ -41,6 +41,7 @@ struct ControllerState final : rapid::Machine {
   void move_reference();
   void start_ramp(double duration_s);
   void record_weld();
+  void record_motion(const kinematics::Joints& before);
   void set_panel(PanelState next);
   bool start_program(bool forever);
   void stop_program(const std::string& why);
@@ -50,6 +51,14 @@ struct ControllerState final : rapid::Machine {
   void set_auto(bool automatic);
   /// Warm start: program stopped, motors off, EGM ended, mastership gone; RWS is away for a while.
   void restart(double duration_s);
+  /// Motion supervision: event 50204, the program stops, the motors stay on.
+  void collide();
+  /// The next RAPID move leads through the wrist's singularity (50026); guided by EGM, a joint leaves its
+  /// range now (50027).
+  void come_near_singularity();
+  /// Once the arm rests, carries out a wish to have the program pointer moved to main.
+  void move_pointer();
+  void end_faults();
   bool restarting() const { return fault_until_s.contains("restart"); }
   /// Name and value of every I/O signal, in order: the cell's own, then idle ones as on any real cabinet.
   std::vector<std::pair<std::string, double>> signals();
@@ -96,6 +105,8 @@ struct ControllerState final : rapid::Machine {
   bool arc_on = false;
   Eigen::Isometry3d arc_tool = Eigen::Isometry3d::Identity();
   std::vector<WeldTrace> welds;
+  std::vector<MotionSpan> motions;
+  bool singular_ahead = false, pointer_moves = false;
 
   std::map<std::string, double> fault_until_s;  ///< lasting faults; infinity = for good
   std::vector<Event> events;

@@ -105,6 +105,10 @@ void Instruction::start(const Move& move) {
   ControllerState& s = s_;
   if (s.drive != Drive::Path)
     throw RapidError{rapid::kErrNotHandled, "motion while EGM guides the arm", 41826};
+  if (std::exchange(s.singular_ahead, false)) {
+    throw RapidError{rapid::kErrNotHandled, call_.at(0).name + ": too close to the wrist's singularity",
+                     50026};
+  }
   if (Status added = s.path.add(move); !added) throw motion_fault(added.error());
   if (move.fine) {
     waits_.push_back([&s] { return s.path.idle(); });

@@ -59,7 +59,7 @@ LiveCell::LiveCell(Scene scene, LiveOptions options)
       egm_(scene_.cell.egm),
       laser_outlet_(laser_outlet(scene_.cell)),
       rws_(rws_options(scene_, options_), controller_, lock_),
-      faults_(scene_.faults.begin(), scene_.faults.end()) {
+      faults_(scene_.faults) {
   if (options_.plc) {
     plc_ = std::make_unique<PlcLink>(scene_.cell.modbus, scene_.cell.word_order,
                                      PlcWorker(scene_.plc_confirm_after_s, options_.plc_rearm));
@@ -80,7 +80,13 @@ void LiveCell::write_truth() {
   std::string text;
   {
     const std::lock_guard<std::mutex> hold(lock_);
-    text = truth_json(scene_, controller_.weld_traces());
+    // By CLOCK_MONOTONIC, so that other programs of this machine can place them.
+    std::vector<MotionSpan> motions = controller_.motions();
+    for (MotionSpan& motion : motions) {
+      motion.begin_s += seconds(start_.ns);
+      motion.end_s += seconds(start_.ns);
+    }
+    text = truth_json(scene_, controller_.weld_traces(), motions);
   }
   const std::string fresh = options_.truth_file + ".new";
   std::ofstream file(fresh, std::ios::binary);
@@ -92,14 +98,10 @@ void LiveCell::write_truth() {
 }
 
 void LiveCell::start_faults(HostTime now) {
-  if (scan_begin_s_ < 0 && controller_.egm_guiding()) scan_begin_s_ = seconds(now.ns);
-  std::erase_if(faults_, [&](const TimedFault& fault) {
-    if (fault.after_scan_begin && scan_begin_s_ < 0) return false;
-    if (seconds(now.ns) < fault.at_s + (fault.after_scan_begin ? scan_begin_s_ : 0)) return false;
+  for (const TimedFault& fault : faults_.due(now, controller_)) {
     std::fprintf(stderr, "weldcell-sim: fault %s for %g s\n", fault.kind.c_str(), fault.duration_s);
     if (!laser_.inject(fault.kind, fault.duration_s)) controller_.inject(fault.kind, fault.duration_s);
-    return true;
-  });
+  }
 }
 
 void LiveCell::cycle(HostTime now) {
@@ -121,14 +123,14 @@ void LiveCell::cycle(HostTime now) {
 }
 
 void LiveCell::run(const std::atomic<bool>& stop) {
+  start_ = monotonic();
   write_truth();
-  const HostTime start = monotonic();
   const Nanoseconds cycle_ns = from_seconds(scene_.controller.cycle_ms * 1e-3);
   HostTime next{cycle_ns};
   while (!stop) {
     const bool block_first = !blocks_.empty() && blocks_.front().arrival < next;
-    sleep_until(start + (block_first ? blocks_.front().arrival : next).ns);
-    const HostTime now{monotonic() - start};
+    sleep_until(start_ + (block_first ? blocks_.front().arrival : next).ns);
+    const HostTime now{monotonic() - start_};
     if (now >= next) {
       cycle(next);
       next = next + cycle_ns;

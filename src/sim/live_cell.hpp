@@ -12,6 +12,7 @@
 #include "sim/laser_server.hpp"
 #include "sim/plc_link.hpp"
 #include "sim/rws_server.hpp"
+#include "weldcell/sim/fault_schedule.hpp"
 
 namespace weldcell::sim {
 
@@ -47,8 +48,8 @@ class LiveCell {
   RwsServer rws_;
   std::unique_ptr<PlcLink> plc_;
   std::deque<LaserBlock> blocks_;
-  std::deque<TimedFault> faults_;
-  double scan_begin_s_ = -1;
+  FaultSchedule faults_;
+  HostTime start_;
   std::uint64_t programs_ended_ = 0, programs_seen_ = 0;
 };
 

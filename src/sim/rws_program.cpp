@@ -32,6 +32,7 @@ HttpReply RwsHandler::execution() {
     if (!s_.task.set_pointer("", "main")) return fault(400, kRwsWrongState, "No routine main");
     s_.path.reset(s_.reference);
     s_.egm_interrupted = false;
+    s_.log(1, 10002, "Program pointer has been reset", "The program pointer of task T_ROB1 has been reset");
     return no_content();
   }
   if (action_is("setcycle")) {

@@ -54,14 +54,15 @@ struct RwsServer::Shared {
   RwsSubscriptions::Observe observe() {
     return [this](const std::string& uri) { return controller.observe_rws(uri); };
   }
-  /// False while a restart is under way; after one nothing of before is known. Under the lock.
+  /// False while a restart is under way or the network is gone; after a restart nothing of before is known.
+  /// Under the lock.
   bool awake() {
     if (controller.restarts() != restarts_seen) {
       restarts_seen = controller.restarts();
       sessions.forget_all();
       subscriptions.forget_all();
     }
-    return !controller.restarting();
+    return !controller.rws_silent();
   }
 };
 
@@ -88,7 +89,7 @@ class Handler final : public net::HTTPRequestHandler {
     std::string poll;
     const auto reply = answer(request, response, body, poll);
     if (!reply) {
-      // A controller that restarts closes its connections without a word.
+      // Nobody is there: the connection ends without a word.
       static_cast<net::HTTPServerRequestImpl&>(request).socket().shutdown();
       response.setKeepAlive(false);
       return;

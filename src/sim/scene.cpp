@@ -140,7 +140,8 @@ std::vector<double> seam_errors_mm(const Scene& scene, const std::vector<WeldTra
   return out;
 }
 
-std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces) {
+std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces,
+                       const std::vector<MotionSpan>& motions) {
   nlohmann::ordered_json out;
   out["scene"] = scene.name;
   out["seed"] = scene.seed;
@@ -179,6 +180,8 @@ std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces)
   for (const WeldedSeam& seam : welded_seams(scene, traces)) {
     out["welded"].push_back({{"seam", seam.seam}, {"lateral_error_mm", seam.lateral_error_mm}});
   }
+  out["motions_s"] = nlohmann::ordered_json::array();
+  for (const MotionSpan& motion : motions) out["motions_s"].push_back({motion.begin_s, motion.end_s});
   return out.dump(1);
 }
 

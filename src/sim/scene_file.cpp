@@ -17,8 +17,10 @@ using files::Map;
 using files::Need;
 using files::Node;
 
-const std::vector<std::string> kKinds{"laser_drop", "laser_stall", "egm_silence",  "estop",   "guardstop",
-                                      "motors_off", "manual",      "program_stop", "restart", "rws_503"};
+const std::vector<std::string> kKinds{"laser_drop",   "laser_stall", "egm_silence", "estop",
+                                      "guardstop",    "motors_off",  "motors_on",   "manual",
+                                      "program_stop", "pp_moved",    "collision",   "singularity",
+                                      "restart",      "rws_503",     "rws_silence"};
 
 constexpr files::Choice<Finish> kFinishes[] = {{"ideal", Finish::Ideal},
                                                {"mill_scale", Finish::MillScale},
@@ -227,7 +229,8 @@ Result<TimedFault> parse_fault(const std::string& text) {
   const std::size_t at = text.find('@');
   out.kind = text.substr(0, at);
   const auto refuse = [&](const std::string& what) {
-    return Error{"scene.fault", text, what, "KIND[@[scan+]SECONDS][:DURATION], e.g. laser_drop@scan+5:2"};
+    return Error{"scene.fault", text, what,
+                 "KIND[@[scan+|weld+]SECONDS][:DURATION], e.g. laser_drop@scan+5:2"};
   };
   if (std::find(kKinds.begin(), kKinds.end(), out.kind) == kKinds.end()) {
     std::string words;
@@ -241,9 +244,12 @@ Result<TimedFault> parse_fault(const std::string& text) {
       return refuse("duration is no number");
     when.resize(colon);
   }
-  if (when.rfind("scan", 0) == 0) {
-    out.after_scan_begin = true;
-    when = when.size() > 5 && when[4] == '+' ? when.substr(5) : when == "scan" ? "0" : "?";
+  for (const auto& [word, after] :
+       {std::pair("scan", TimedFault::After::Scan), std::pair("weld", TimedFault::After::Weld)}) {
+    if (!when.starts_with(word)) continue;
+    out.after = after;
+    when = when.size() > 5 && when[4] == '+' ? when.substr(5) : when == word ? "0" : "?";
+    break;
   }
   if (!take_number(when, out.at_s)) return refuse("time is no number");
   return out;

@@ -19,6 +19,7 @@ struct VirtualJob {
   workpiece::Workpiece workpiece;
   std::string resident_module;  ///< text of WeldcellEgm.mod
   double give_up_s = 1200;      ///< virtual time
+  bool plc = false;             ///< a PLC is required, and there
 };
 
 struct VirtualOutcome {
@@ -35,6 +36,43 @@ struct VirtualOutcome {
   int passes = 0, points = 0;
   std::shared_ptr<const job::Solution> solution;  ///< of the last localization; null when there was none
   std::vector<std::string> log;
+};
+
+/// The cell cycle by cycle, with its daemon to be killed and started again. The scene's faults come at their
+/// time. The job arrives when the cell is made; nobody orders anything but the caller.
+class VirtualCell {
+ public:
+  /// All three must outlive the cell.
+  VirtualCell(const files::CellConfig& config, const sim::Scene& scene, const VirtualJob& job);
+  ~VirtualCell();
+
+  /// One cycle of the controller.
+  void advance();
+  double now_s() const;
+  /// The job has ended, and how.
+  bool finished() const;
+  VirtualOutcome outcome() const;
+
+  bool daemon_runs() const;
+  /// Of the running daemon.
+  const job::CellStatus& status() const;
+  /// Orders as a person would; why it was refused, empty when it was obeyed.
+  std::string order(wire::PlcCommand command);
+  /// Confirms and starts as a job needs it in its present state; arms only when the job waits for its start.
+  void act_as_person();
+  /// From one moment to the next, as by power loss: what was durable stays.
+  void kill_daemon();
+  /// The job is found interrupted.
+  void start_daemon();
+  void set_plc_heartbeat(bool up);
+
+  sim::Controller& controller();
+  /// When the cell was not armed, a dead daemon's time included; the last stretch may last still.
+  std::vector<sim::MotionSpan> unarmed() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 /// Runs one job to its end, a person arming, starting and confirming at once.

@@ -60,6 +60,8 @@ class Controller {
   int rws_generation() const;
   /// A restart is under way: nothing answers; and how often that happened.
   bool restarting() const;
+  /// Robot Web Services answer nothing now, not even a refusal: a restart, or the network is gone.
+  bool rws_silent() const;
   std::uint64_t restarts() const;
 
   /// True arm posture now (not what EGM reports).
@@ -68,9 +70,13 @@ class Controller {
   /// them. step() must have been called at equal intervals of the cycle.
   kinematics::Joints joints_at(HostTime t) const;
   const std::vector<WeldTrace>& weld_traces() const;
-  /// Faults from outside: "estop", "guardstop", "motors_off", "manual", "program_stop", "restart",
-  /// "egm_silence", "rws_503". Those that last end after duration_s (0: never; a restart takes 5 s). False
-  /// when the kind is unknown.
+  /// Every motion of the arm so far, whatever moved it; rests shorter than 0.1 s do not part two of them.
+  const std::vector<MotionSpan>& motions() const;
+  bool arc_on() const;
+  /// From outside: "estop", "guardstop", "motors_off", "motors_on" (the button), "manual", "program_stop",
+  /// "pp_moved" (stopped, then the pointer to main), "collision" (motion supervision), "singularity" (of the
+  /// next move), "restart", "egm_silence", "rws_503", "rws_silence". Those that last end after duration_s (0:
+  /// never; a restart takes 5 s). False when the kind is unknown.
   bool inject(const std::string& fault, double duration_s = 0);
 
   /// Loads a module as a disk restart would: no mastership needed. Error "rapid.*".

@@ -49,10 +49,12 @@ struct MemberSpread {
 };
 
 struct TimedFault {
-  double at_s = 0;  ///< after the scan began ("scan+12.5"), or after start
-  bool after_scan_begin = false;
-  std::string kind;  ///< "laser_drop", "laser_stall", "egm_silence", "estop", "motors_off", "rws_503", ...
-  double duration_s = 0;
+  /// What `at_s` counts from: the simulator's start, the first guided motion, the first arc.
+  enum class After : std::uint8_t { Start, Scan, Weld };
+  std::string kind;  ///< as Controller::inject() and LaserDevice::inject() know them
+  After after = After::Start;
+  double at_s = 0;
+  double duration_s = 0;  ///< 0: for good
 };
 
 struct Scene {
@@ -80,7 +82,7 @@ std::vector<MemberTruth> deviated(const workpiece::Workpiece& workpiece, const M
 std::variant<Scene, files::Faults> read_scene(const std::string& path, const files::CellConfig& cell,
                                               std::uint64_t seed);
 
-/// "laser_drop@scan+5:2" = kind, when (seconds after start or after the scan began), how long. Error
+/// "laser_drop@scan+5:2" = kind, when (seconds after start, or after scan or weld began), how long. Error
 /// "scene.fault".
 Result<TimedFault> parse_fault(const std::string& text);
 
@@ -88,6 +90,11 @@ Result<TimedFault> parse_fault(const std::string& text);
 struct WeldTrace {
   std::string seam;
   std::vector<Eigen::Vector3d> tcp_mm;
+};
+
+/// A stretch in which the arm moved.
+struct MotionSpan {
+  double begin_s = 0, end_s = 0;
 };
 
 /// A seam as it really lies: points of its line in Base, at the height of the drawing above the table.
@@ -106,7 +113,8 @@ std::vector<WeldedSeam> welded_seams(const Scene& scene, const std::vector<WeldT
 std::vector<double> seam_errors_mm(const Scene& scene, const std::vector<WeldTrace>& traces);
 
 /// truth.json: pose, members, seams' true lines, latency, clocks; with traces also what was welded and how
-/// far off.
-std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces = {});
+/// far off; when the arm moved, in seconds of the caller's clock.
+std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces = {},
+                       const std::vector<MotionSpan>& motions = {});
 
 }  // namespace weldcell::sim

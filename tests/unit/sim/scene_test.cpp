@@ -70,12 +70,15 @@ TEST(Scene, FaultSpecs) {
   const auto fault = parse_fault("laser_drop@scan+5:2");
   ASSERT_TRUE(fault);
   EXPECT_EQ(fault->kind, "laser_drop");
-  EXPECT_TRUE(fault->after_scan_begin);
+  EXPECT_EQ(fault->after, TimedFault::After::Scan);
   EXPECT_EQ(fault->at_s, 5);
   EXPECT_EQ(fault->duration_s, 2);
   EXPECT_EQ(parse_fault("estop@3.5")->at_s, 3.5);
-  EXPECT_TRUE(parse_fault("egm_silence@scan")->after_scan_begin);
-  for (const char* text : {"", "fire", "estop@", "estop@x", "estop@1:", "estop@-1", "estop@scan5"})
+  EXPECT_EQ(parse_fault("egm_silence@scan")->after, TimedFault::After::Scan);
+  EXPECT_EQ(parse_fault("collision@weld+2.5")->after, TimedFault::After::Weld);
+  EXPECT_EQ(parse_fault("collision@weld+2.5")->at_s, 2.5);
+  for (const char* text :
+       {"", "fire", "estop@", "estop@x", "estop@1:", "estop@-1", "estop@scan5", "estop@weld5"})
     EXPECT_FALSE(parse_fault(text)) << text;
 }
 
