@@ -142,6 +142,11 @@ Status RwsClient::start(bool forever) { return command(dialect_.start(forever));
 Status RwsClient::stop() { return command(dialect_.stop()); }
 Status RwsClient::reset_pp() { return command(dialect_.reset_pp()); }
 
+Result<std::string> RwsClient::pointer_module(std::string_view task) {
+  // "modulemame" is the controllers' own spelling.
+  return field(dialect_.program_pointer(task), "pcp-info", "modulemame");
+}
+
 Status RwsClient::set_pp_to_routine(std::string_view task, std::string_view module,
                                     std::string_view routine) {
   return command(dialect_.set_pp_to_routine(task, module, routine));

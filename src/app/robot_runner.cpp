@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <vector>
 
 #include "weldcell/base/units.hpp"
 #include "weldcell/weld/resident.hpp"
@@ -36,8 +38,10 @@ std::optional<job::RobotReply> RobotRunner::step(HostTime now) {
       break;
     case Phase::Halt: {
       // Whatever runs belongs to an earlier request: stop it before anything is written.
+      was_running_ = false;
       const Status halted = halt();
       if (!halted.ok()) return answer(halted);
+      if (request_.own_only && !was_running_) return answer(Done{});
       phase_ = Phase::AwaitHalt;
       break;
     }
@@ -77,7 +81,12 @@ std::optional<job::RobotReply> RobotRunner::await_halt(HostTime now) {
   const auto running = rws_->execution_state();
   if (!running.ok()) return answer(running.error());
   if (*running == adapters::ExecutionState::Stopped) {
-    if (request_.task == job::RobotTask::Stop) return answer(Done{});
+    if (request_.task == job::RobotTask::Stop) {
+      job::RobotReply reply = answer(Done{});
+      reply.running = was_running_;
+      reply.text = latest_events();
+      return reply;
+    }
     phase_ = Phase::Act;
     next_poll_ = now;
   } else if (seconds(now - since_) > kHaltTimeout) {
@@ -98,7 +107,7 @@ std::optional<job::RobotReply> RobotRunner::await_end(HostTime now) {
   const auto state = rws_->read_symbol(task_, weld::kResidentModule, weld::kStateSymbol);
   if (!state.ok()) return answer(state.error());
   if (*state == std::to_string(static_cast<int>(weld::ResidentState::There))) return answer(Done{});
-  return answer(Error{"robot.move", "RAPID", "the move stopped before its end: " + last_event_text(),
+  return answer(Error{"robot.move", "RAPID", "the move stopped before its end: " + latest_events(),
                       "clear the cause, arm and resume"});
 }
 
@@ -116,6 +125,11 @@ Status RobotRunner::halt() {
   const auto running = rws_->execution_state();
   if (!running.ok()) return running.error();
   if (*running == adapters::ExecutionState::Stopped) return Done{};
+  if (request_.own_only) {
+    const auto module = rws_->pointer_module(task_);
+    if (module.ok() && *module != weld::kResidentModule && *module != kJobModule) return Done{};
+  }
+  was_running_ = true;
   return rws_->stop();
 }
 
@@ -194,11 +208,19 @@ Status RobotRunner::run_routine(const std::string& module, const std::string& ro
   return rws_->start();
 }
 
-std::string RobotRunner::last_event_text() {
-  const auto events = rws_->event_log(1);
-  if (!events.ok() || events->empty()) return "no entry in the event log";
-  const auto& event = events->front();
-  return std::to_string(event.code) + " " + event.title;
+std::string RobotRunner::latest_events() {
+  constexpr int kLookBack = 6;
+  constexpr std::size_t kTold = 3;
+  // Program started, or restarted: what lies before is history.
+  constexpr std::array kStarted{10150, 10151, 10155, 10156};
+  const auto events = rws_->event_log(kLookBack);
+  if (!events.ok()) return {};
+  std::vector<std::string> told;
+  for (const auto& event : *events) {
+    if (std::ranges::find(kStarted, event.code) != kStarted.end() || told.size() == kTold) break;
+    told.push_back(std::to_string(event.code) + " " + event.title);
+  }
+  return told.empty() ? "no entry in the event log" : fmt::format("{}", fmt::join(told, ", "));
 }
 
 job::RobotReply RobotRunner::query() {
@@ -212,7 +234,7 @@ job::RobotReply RobotRunner::query() {
   reply.running = *running != adapters::ExecutionState::Stopped;
   reply.seams_done = std::atoi(seams->c_str());
   reply.seams_begun = std::atoi(begun->c_str());
-  if (!reply.running) reply.text = last_event_text();
+  if (!reply.running) reply.text = latest_events();
   return reply;
 }
 

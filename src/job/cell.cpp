@@ -103,9 +103,19 @@ void Cell::on(const Tick&) {
         request(RobotTask::Query);
       }
       break;
+    case State::Faulted:
+    case State::Interrupted:
+      chase_stop();
+      break;
     default:
       break;
   }
+}
+
+void Cell::chase_stop() {
+  const bool reachable = status_.links[static_cast<std::size_t>(Link::Rws)];
+  if (!stop_owed_ || !reachable || seconds(now_ - last_stop_) < timeouts_.stop_again_s) return;
+  if (stop_request_ == 0) request(RobotTask::Stop);
 }
 
 void Cell::watch_scan() {
@@ -116,7 +126,7 @@ void Cell::watch_scan() {
     if (seconds(now_ - motion_done_at_) >= timeouts_.settle_s) fire(Event::MotionDone);
   } else if (seconds(now_ - last_egm_) > timeouts_.egm_gap_s) {
     fault(FaultCode::EgmLost,
-          "the robot controller sends no EGM frames: the robot has stopped by its own time-out");
+          "the robot controller sends no EGM frames: it has stopped the robot, or does so by its time-out");
   }
 }
 
@@ -229,6 +239,8 @@ void Cell::on(const JobArrived& arrived) {
   status_.progress = 0;
   status_.seams_done = arrived.seams_done;
   weld_begun_ = arrived.weld_begun;
+  awaited_request_ = seams_request_ = stop_request_ = 0;
+  stop_owed_ = stop_own_only_ = false;
   seams_known_ = !weld_begun_;
   interrupted_seam_ = 0;
   status_.seams = 0;
@@ -243,6 +255,15 @@ void Cell::on(const JobArrived& arrived) {
       "job '" + arrived.order.name +
           "' was interrupted: make the cell safe, then arm and resume it, or abort it");
   fire(Event::JobFound);
+  // Nobody has armed this process, so nothing of weldcell's may move; another program is not its business.
+  stop_owed_ = stop_own_only_ = true;
+  status_.fault_text = weld_begun_
+                           ? "interrupted while welding: RAPID may still be welding the seam at hand, "
+                             "and is stopped as soon as the controller answers"
+                           : "interrupted: RAPID may still be moving the robot, and is stopped as soon "
+                             "as the controller answers";
+  log(LogEvent::Level::Warning, status_.fault_text);
+  chase_stop();
 }
 
 void Cell::on(const ImportDone& done) {
@@ -288,7 +309,14 @@ void Cell::on(const SolveDone& done) {
 }
 
 void Cell::on(const RobotReply& reply) {
-  if (reply.id == 0 || reply.id != awaited_request_) return;
+  if (reply.id == 0) return;
+  if (reply.id == stop_request_) return settle_stop(reply);
+  if (reply.id == seams_request_) {
+    seams_request_ = 0;
+    if (reply.ok) return settle_seams(reply);
+    return fault(FaultCode::RobotCommand, "how many seams were welded is not known: " + reply.text);
+  }
+  if (reply.id != awaited_request_) return;
   awaited_request_ = 0;
   if (!reply.ok) {
     if (under_way(status_.state)) {
@@ -307,10 +335,7 @@ void Cell::on(const RobotReply& reply) {
       last_query_ = now_;
       break;
     case RobotTask::Query:
-      if (status_.state != State::Welding) {
-        settle_seams(reply);
-        break;
-      }
+      if (status_.state != State::Welding) break;
       if (reply.seams_done > status_.seams_done) {
         status_.seams_done = reply.seams_done;
         status_.progress = status_.seams > 0 ? static_cast<double>(status_.seams_done) / status_.seams : 1;
@@ -327,6 +352,25 @@ void Cell::on(const RobotReply& reply) {
     default:
       break;
   }
+}
+
+void Cell::settle_stop(const RobotReply& reply) {
+  stop_request_ = 0;
+  if (!reply.ok) return;  // sent again while the cell stands
+  stop_owed_ = false;
+  if (status_.state == State::Interrupted) {
+    status_.fault_text.clear();
+    if (reply.running) {
+      log(LogEvent::Level::Warning, weld_begun_ ? "RAPID was still welding: stopped; look at the seam at hand"
+                                                : "RAPID still ran from before: stopped");
+    }
+    return;
+  }
+  const bool told_by_egm = status_.fault == FaultCode::EgmLost || status_.fault == FaultCode::RobotStopped;
+  if (status_.state != State::Faulted || !told_by_egm || reply.text.empty()) return;
+  // EGM only fell silent; the controller knows why.
+  status_.fault_text += "; the controller's log: " + reply.text;
+  log(LogEvent::Level::Error, "the controller's log: " + reply.text);
 }
 
 void Cell::settle_seams(const RobotReply& reply) {

@@ -148,6 +148,7 @@ void Cell::act(Action action) {
       status_.fault = FaultCode::None;
       status_.fault_text.clear();
       status_.pass = 0;
+      stop_own_only_ = false;
       if (weld_begun_) {
         seams_known_ = false;
         request(RobotTask::Stop);
@@ -272,7 +273,14 @@ void Cell::request(RobotTask task) {
     default:
       break;
   }
-  if (task != RobotTask::Stop) {
+  if (task == RobotTask::Stop) {
+    request.own_only = stop_own_only_;
+    stop_request_ = request.id;
+    stop_owed_ = true;
+    last_stop_ = now_;
+  } else if (task == RobotTask::Query && status_.state != State::Welding) {
+    seams_request_ = request.id;
+  } else {
     awaited_request_ = request.id;
     awaited_task_ = task;
   }
@@ -283,8 +291,9 @@ void Cell::fault(FaultCode code, const std::string& text) {
   if (!under_way(status_.state)) return;
   log(LogEvent::Level::Error, std::string(to_string(code)) + " in " + to_string(status_.state) + ": " + text);
   resume_state_ = status_.state;
-  awaited_request_ = 0;
+  awaited_request_ = seams_request_ = 0;
   scan_.reset();
+  stop_own_only_ = false;
   status_.fault = code;
   status_.fault_text = text;
   cleared_ = false;
@@ -297,7 +306,8 @@ void Cell::fault(FaultCode code, const std::string& text) {
 }
 
 void Cell::finish_with(bool accepted, const std::string& verdict, const std::string& reason) {
-  awaited_request_ = 0;
+  awaited_request_ = seams_request_ = 0;
+  stop_own_only_ = false;
   status_.guide_step = 0;
   out_.push_back(StopMotion{});
   if (!accepted) request(RobotTask::Stop);

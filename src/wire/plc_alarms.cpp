@@ -9,13 +9,14 @@ namespace {
 constexpr PlcAlarm kAlarms[] = {
     {10, "EGM frames stopped", PlcSeverity::Fault,
      "no datagram from the robot controller for 0.4 s in a scan",
-     "the robot has stopped by its own time-out: check the network, Arm, Resume"},
+     "the robot has stopped: the log quotes the controller; clear it there, or mend the network, Arm, "
+     "Resume"},
     {11, "EGM did not start", PlcSeverity::Fault, "no running session 30 s after the scan program began",
      "read the event log on the FlexPendant; check UdpUc address and port and the module WeldcellEgm"},
     {12, "motion refused", PlcSeverity::Fault, "the robot is not where the motion begins, or is not armed",
      "the log names the reason; Arm, Resume"},
     {13, "robot stopped", PlcSeverity::Fault, "motors off, emergency stop or program stop at the controller",
-     "clear it at the controller, Arm, Resume"},
+     "clear it at the controller; after an emergency stop press Motors On there; Arm, Resume"},
     {20, "laser lost", PlcSeverity::Fault, "its connection closed, or no reading for 0.5 s in a scan",
      "check the sensor's power and network, Arm, Resume"},
     {21, "laser data lost", PlcSeverity::Fault, "the machine was too slow for the readings",

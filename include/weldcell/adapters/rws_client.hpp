@@ -93,6 +93,8 @@ class RwsClient {
   Status stop();
   /// Program pointer to main in all tasks. Needs mastership of rapid.
   Status reset_pp();
+  /// The module in which the program pointer of the task stands; "" when it is not set.
+  Result<std::string> pointer_module(std::string_view task);
   Status set_pp_to_routine(std::string_view task, std::string_view module, std::string_view routine);
 
   Status request_mastership(MastershipDomain domain);

@@ -39,7 +39,8 @@ class RobotRunner {
   Status make_resident();
   Status run_routine(const std::string& module, const std::string& routine, const std::string& symbol_module,
                      const std::string& symbol, const std::string& literal);
-  std::string last_event_text();
+  /// The controller's entries since the program began, the newest first, three at most.
+  std::string latest_events();
   job::RobotReply query();
 
   adapters::RwsClient* rws_;
@@ -48,7 +49,7 @@ class RobotRunner {
   job::RobotRequest request_;
   Phase phase_ = Phase::Idle;
   HostTime since_, next_poll_, asked_;
-  bool resident_checked_ = false;
+  bool resident_checked_ = false, was_running_ = false;
 };
 
 }  // namespace weldcell::app

@@ -91,8 +91,8 @@ struct SolveDone {
 struct RobotReply {
   std::uint64_t id = 0;
   bool ok = false;
-  std::string text;      ///< cause and mend when not ok
-  bool running = false;  ///< of Query: RAPID executes
+  std::string text;  ///< cause and mend when not ok; else, of Stop and Query, the controller's latest events
+  bool running = false;  ///< of Query: RAPID executes; of Stop: it did when the stop came
   int seams_done = 0;    ///< of Query: their arc is out
   int seams_begun = 0;   ///< of Query: their arc was about to start
 };
@@ -124,6 +124,7 @@ struct RobotRequest {
   kinematics::Joints joints{};  ///< Move, OpenScan: where RAPID moves first
   std::string module_text;      ///< Upload
   int skip_seams = 0;           ///< Weld
+  bool own_only = false;        ///< Stop: nothing but weldcell's own modules
 };
 struct ImportRequest {};
 struct PlanRequest {};
@@ -201,6 +202,7 @@ struct CellTimeouts {
   double egm_gap_s = 0.4;  ///< below the controller's own time-out of 0.5 s
   double egm_open_s = 30;
   double query_s = 0.4;
+  double stop_again_s = 1;  ///< a stop that did not arrive is sent again
   double laser_gap_s = 0.5;
   double offer_s = 0.25;  ///< a refusal seen earlier than this after the offer belongs to the plan before
   double settle_s = 0.1;  ///< rest after a scan, so that the last readings arrive
@@ -270,6 +272,8 @@ class Cell {
   void watch_scan();
   void save_state();
   void settle_seams(const RobotReply& reply);
+  void settle_stop(const RobotReply& reply);
+  void chase_stop();
   void log(LogEvent::Level level, const std::string& text);
   void refresh_plc();
   Answer start_hindrance() const;
@@ -297,13 +301,17 @@ class Cell {
   wire::EgmCodec codec_;
   wire::LaserDecoder laser_decoder_;
   std::uint64_t next_request_ = 1, awaited_request_ = 0;
+  std::uint64_t seams_request_ = 0;  ///< the query after a resume; other requests may follow it at once
+  std::uint64_t stop_request_ = 0;   ///< the last stop, until it is answered
+  bool stop_owed_ = false;           ///< RAPID was to be stopped, and nobody has said that it is
+  bool stop_own_only_ = false;       ///< that stop spares programs that are not weldcell's
   RobotTask awaited_task_ = RobotTask::Query;
   bool program_started_ = false;
   bool weld_begun_ = false;   ///< a weld program of this job was started, perhaps by an earlier process
   bool seams_known_ = true;   ///< false: how far that program came must be asked before the next arc
   int interrupted_seam_ = 0;  ///< left out, to be finished by hand; 0 = none
   int running_frames_ = 0;
-  HostTime state_since_, last_egm_, last_laser_, last_query_, motion_done_at_;
+  HostTime state_since_, last_egm_, last_laser_, last_query_, last_stop_, motion_done_at_;
   bool egm_seen_ = false, motion_started_ = false, motion_finished_ = false;
   std::uint16_t last_sequence_ = 0;
   bool sequence_known_ = false;
