@@ -91,7 +91,8 @@ std::pair<std::string, json> small_input(const job::InputBody& body) {
                      {"text", r.text},
                      {"running", r.running},
                      {"seams_done", r.seams_done},
-                     {"seams_begun", r.seams_begun}}};
+                     {"seams_begun", r.seams_begun},
+                     {"seams_allowed", r.seams_allowed}}};
           },
           [](const Overrun& o) -> Named {
             return {"/cell/overrun", {{"link", static_cast<int>(o.link)}, {"lost", o.lost}}};
@@ -133,8 +134,13 @@ std::optional<job::InputBody> small_input_from(const std::string& topic, const j
     return arrived;
   }
   if (topic == "/robot/reply")
-    return RobotReply{j.at("id"),      j.at("ok"),         j.at("text"),
-                      j.at("running"), j.at("seams_done"), j.at("seams_begun")};
+    return RobotReply{j.at("id"),
+                      j.at("ok"),
+                      j.at("text"),
+                      j.at("running"),
+                      j.at("seams_done"),
+                      j.at("seams_begun"),
+                      j.value("seams_allowed", 0)};
   if (topic == "/cell/storage_lost") return StorageLost{j.at("text")};
   if (topic == "/cell/overrun") return Overrun{static_cast<Link>(j.at("link").get<int>()), j.at("lost")};
   return std::nullopt;

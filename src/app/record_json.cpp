@@ -81,13 +81,11 @@ std::string output_json(const job::Output& output) {
   using namespace job;
   return std::visit(Overloaded{
                         [](const RobotRequest& r) -> json {
-                          return {{"output", "robot"},
-                                  {"id", r.id},
-                                  {"task", to_string(r.task)},
-                                  {"joints_rad", joints_json(r.joints)},
-                                  {"skip_seams", r.skip_seams},
-                                  {"own_only", r.own_only},
-                                  {"module_digest", text_digest(r.module_text)}};
+                          return {
+                              {"output", "robot"},          {"id", r.id},
+                              {"task", to_string(r.task)},  {"joints_rad", joints_json(r.joints)},
+                              {"skip_seams", r.skip_seams}, {"allowed_seams", r.allowed_seams},
+                              {"own_only", r.own_only},     {"module_digest", text_digest(r.module_text)}};
                         },
                         [](const ImportRequest&) -> json {
                           return {{"output", "import"}};

@@ -27,7 +27,8 @@ std::string jointtarget(const kinematics::Joints& q) {
 void RobotRunner::begin(const job::RobotRequest& request, HostTime now) {
   request_ = request;
   since_ = next_poll_ = now;
-  phase_ = request.task == job::RobotTask::Query ? Phase::Act : Phase::Halt;
+  const bool while_running = request.task == job::RobotTask::Query || request.task == job::RobotTask::Allow;
+  phase_ = while_running ? Phase::Act : Phase::Halt;
 }
 
 std::optional<job::RobotReply> RobotRunner::step(HostTime now) {
@@ -143,6 +144,13 @@ Status RobotRunner::act() {
     if (auto s = rws_->load_module(task_, path); !s.ok()) return s;
     return lease->release();
   }
+  if (request_.task == RobotTask::Allow) {
+    auto lease = rws_->lease(adapters::MastershipDomain::Rapid);
+    if (!lease.ok()) return lease.error();
+    const std::string count = std::to_string(request_.allowed_seams);
+    if (auto s = rws_->write_symbol(task_, kJobModule, "nSeamsAllowed", count); !s.ok()) return s;
+    return lease->release();
+  }
   if (auto s = make_ready(); !s.ok()) return s;
   switch (request_.task) {
     case RobotTask::Move:
@@ -230,10 +238,14 @@ job::RobotReply RobotRunner::query() {
   if (!seams.ok()) return answer(seams.error());
   const auto begun = rws_->read_symbol(task_, kJobModule, "nSeamsBegun");
   if (!begun.ok()) return answer(begun.error());
+  const auto allowed = rws_->read_symbol(task_, kJobModule, "nSeamsAllowed");
+  // A module of an earlier version has no such symbol; how far it came is told all the same.
+  if (!allowed.ok() && allowed.error().code != "rws.not_found") return answer(allowed.error());
   job::RobotReply reply = answer(Done{});
   reply.running = *running != adapters::ExecutionState::Stopped;
   reply.seams_done = std::atoi(seams->c_str());
   reply.seams_begun = std::atoi(begun->c_str());
+  reply.seams_allowed = allowed.ok() ? std::atoi(allowed->c_str()) : 0;
   if (!reply.running) reply.text = latest_events();
   return reply;
 }

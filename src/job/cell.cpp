@@ -37,6 +37,8 @@ const char* to_string(RobotTask task) {
       return "weld";
     case RobotTask::Query:
       return "query";
+    case RobotTask::Allow:
+      return "allow the next seam";
   }
   return "?";
 }
@@ -335,23 +337,30 @@ void Cell::on(const RobotReply& reply) {
       last_query_ = now_;
       break;
     case RobotTask::Query:
-      if (status_.state != State::Welding) break;
-      if (reply.seams_done > status_.seams_done) {
-        status_.seams_done = reply.seams_done;
-        status_.progress = status_.seams > 0 ? static_cast<double>(status_.seams_done) / status_.seams : 1;
-        log(LogEvent::Level::Info, "seam " + std::to_string(status_.seams_done) + " of " +
-                                       std::to_string(status_.seams) + " welded");
-        save_state();
-      }
-      if (!reply.running && !fire(Event::ProgramEnded)) {
-        fault(FaultCode::ProgramStopped, "the weld program stopped after seam " +
-                                             std::to_string(status_.seams_done) + " of " +
-                                             std::to_string(status_.seams) + ": " + reply.text);
-      }
+      if (status_.state == State::Welding) weld_goes_on(reply);
       break;
     default:
       break;
   }
+}
+
+void Cell::weld_goes_on(const RobotReply& reply) {
+  if (reply.seams_done > status_.seams_done) {
+    status_.seams_done = reply.seams_done;
+    status_.progress = status_.seams > 0 ? static_cast<double>(status_.seams_done) / status_.seams : 1;
+    log(LogEvent::Level::Info,
+        "seam " + std::to_string(status_.seams_done) + " of " + std::to_string(status_.seams) + " welded");
+    save_state();
+  }
+  if (!reply.running) {
+    if (fire(Event::ProgramEnded)) return;
+    return fault(FaultCode::ProgramStopped, "the weld program stopped after seam " +
+                                                std::to_string(status_.seams_done) + " of " +
+                                                std::to_string(status_.seams) + ": " + reply.text);
+  }
+  // RAPID waits before each seam for a word that is newer than the seam before it.
+  const bool waits = reply.seams_done == status_.seams_done && reply.seams_allowed <= status_.seams_done;
+  if (waits && status_.armed && status_.seams_done < status_.seams) request(RobotTask::Allow);
 }
 
 void Cell::settle_stop(const RobotReply& reply) {

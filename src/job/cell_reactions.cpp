@@ -270,6 +270,9 @@ void Cell::request(RobotTask task) {
     case RobotTask::Weld:
       request.skip_seams = status_.seams_done;
       break;
+    case RobotTask::Allow:
+      request.allowed_seams = status_.seams_done + 1;
+      break;
     default:
       break;
   }

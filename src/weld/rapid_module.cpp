@@ -16,6 +16,7 @@ using rapid::number;
 
 constexpr double kStraightMm = 0.05;  // how far the lines between written targets may leave the planned seam
 constexpr double kStraightRad = rad(0.5);
+constexpr int kAwaitTenths = 100;  // of a second, for weldcelld to let the next seam begin
 constexpr const char* kSuffix = ",tWeldcellTorch\\WObj:=wWeldcell;";
 
 /// Whether the target lies on the line, and its orientation on the slerp, from a to b at this share of the
@@ -78,8 +79,9 @@ std::string header(const cell::CellSetup& cell, const std::string& job, std::siz
   out += "  ! write the base frame's pose into the user frame of wWeldcell.\n\n";
   out +=
       "  ! Seams welded and seams begun so far, read by weldcelld; seams to leave out, written before the "
-      "start.\n";
-  out += "  PERS num nSeamsDone:=0;\n  PERS num nSeamsBegun:=0;\n  PERS num nSeamsToSkip:=0;\n\n";
+      "start;\n  ! seams that may begin, written by weldcelld after each one that has ended.\n";
+  out += "  PERS num nSeamsDone:=0;\n  PERS num nSeamsBegun:=0;\n  PERS num nSeamsToSkip:=0;\n";
+  out += "  PERS num nSeamsAllowed:=0;\n\n";
   out += "  PERS tooldata tWeldcellTorch:=[TRUE,[" + rapid::position(tool.position_mm()) + "," +
          rapid::quaternion(tool.rotation(), like) + "],[" + number(std::max(0.1, cell.torch.mass_kg), 3) +
          "," + rapid::position({cog[0], cog[1], cog[2]}) + ",[1,0,0,0],0,0,0]];\n";
@@ -126,18 +128,32 @@ std::string seam_proc(const cell::CellSetup& cell, const TorchPath& path, const 
   // Counted before the torch leaves: a fly-by point ahead of it would count the seam too early.
   out += "    nSeamsDone:=nSeamsDone+1;\n";
   out += "    MoveL p" + id + "Retract," + near + ",z10" + kSuffix + "\n";
-  out += "    MoveL p" + id + "Away," + air + ",z10" + kSuffix + "\n  ENDPROC\n";
+  // A fine point: what comes next waits for weldcelld's word.
+  out += "    MoveL p" + id + "Away," + air + ",fine" + kSuffix + "\n  ENDPROC\n";
   return out;
 }
 
 std::string main_proc(const cell::CellSetup& cell, std::size_t seams) {
   std::string out = "\n  PROC WeldcellWeld()\n    ConfJ\\On;\n    ConfL\\On;\n    SingArea\\Off;\n";
   out += "    nSeamsDone:=nSeamsToSkip;\n    nSeamsBegun:=nSeamsToSkip;\n";
+  out += "    nSeamsAllowed:=nSeamsToSkip;\n";
   for (std::size_t i = 0; i < seams; ++i) {
-    out += fmt::format("    IF nSeamsToSkip<{} THEN\n      Seam{:02};\n    ENDIF\n", i + 1, i + 1);
+    out += fmt::format("    IF nSeamsToSkip<{} THEN\n      WeldcellAwait;\n      Seam{:02};\n    ENDIF\n",
+                       i + 1, i + 1);
   }
   out += "    MoveAbsJ jWeldcellHome," + speed_name(cell.weld.air_speed_mm_s) + ",fine" + kSuffix + "\n";
   return out + "  ENDPROC\n";
+}
+
+/// Waits for the word that lets the next seam begin, and ends the program when none comes.
+std::string await_proc() {
+  std::string out = "\n  ! No seam begins without a word of weldcelld that is newer than the seam before.\n";
+  out += "  PROC WeldcellAwait()\n    VAR num nTenths:=0;\n    WHILE nSeamsAllowed<=nSeamsDone DO\n";
+  out += fmt::format("      IF nTenths>={} THEN\n", kAwaitTenths);
+  out += "        TPWrite \"weldcell: the cell controller is silent\";\n";
+  out += "        TPWrite \"weldcell: ended before seam \"\\Num:=nSeamsDone+1;\n        EXIT;\n      ENDIF\n";
+  out += "      WaitTime 0.1;\n      nTenths:=nTenths+1;\n    ENDWHILE\n  ENDPROC\n";
+  return out;
 }
 
 }  // namespace
@@ -151,7 +167,7 @@ std::string rapid_module(const cell::CellSetup& cell, const std::string& job,
     out += targets_of(paths[i], id, points);
     procs += seam_proc(cell, paths[i], id, points.size());
   }
-  return out + main_proc(cell, paths.size()) + procs + "ENDMODULE\n";
+  return out + main_proc(cell, paths.size()) + await_proc() + procs + "ENDMODULE\n";
 }
 
 }  // namespace weldcell::weld

@@ -24,8 +24,9 @@ using testing::HasSubstr;
 using wire::PlcCommand;
 
 constexpr std::uint64_t kSeed = 21;
-constexpr double kSettle_s = 3;  // within which whatever moved must rest
-constexpr double kStand_s = 8;   // for which the cell must stay where it is, by itself
+constexpr double kSettle_s = 3;     // within which whatever moved must rest
+constexpr double kStand_s = 8;      // for which the cell must stay where it is, by itself
+constexpr double kSeamEnds_s = 15;  // within which a seam under way ends and the torch is away
 constexpr double kGiveUp_s = 900;
 
 /// What the PC's side suffers; the scene's faults are the controller's and the sensor's.
@@ -114,6 +115,11 @@ class Recovery : public testing::TestWithParam<Case> {
   }
   bool state_is(State state) const { return cell_->daemon_runs() && cell_->status().state == state; }
 
+  void note_loss() {
+    arcs_at_loss_ = cell_->controller().weld_traces().size();
+    loss_s_ = cell_->now_s();
+  }
+
   void suffer() {
     if (c_.loss == Loss::None) return;
     ASSERT_TRUE(run_until([&] { return state_is(c_.in); })) << story();
@@ -125,7 +131,7 @@ class Recovery : public testing::TestWithParam<Case> {
       cell_->set_plc_heartbeat(false);
       return;
     }
-    arcs_at_loss_ = cell_->controller().weld_traces().size();
+    note_loss();
     cell_->kill_daemon();
     run_for(c_.down_s);
     cell_->start_daemon();
@@ -138,11 +144,12 @@ class Recovery : public testing::TestWithParam<Case> {
     ASSERT_TRUE(state_is(state)) << story();
     EXPECT_FALSE(cell_->status().armed);
     EXPECT_EQ(cell_->status().fault, c_.fault) << cell_->status().fault_text << "\n" << story();
-    if (c_.loss != Loss::Daemon) arcs_at_loss_ = cell_->controller().weld_traces().size();
+    if (c_.loss != Loss::Daemon) note_loss();
     if (c_.seam_finished) {
       ASSERT_TRUE(run_until([&] { return !cell_->controller().program_running(); })) << story();
       EXPECT_FALSE(cell_->controller().arc_on());
       EXPECT_EQ(cell_->controller().weld_traces().size(), arcs_at_loss_) << "a seam was begun without the PC";
+      EXPECT_LT(cell_->controller().motions().back().end_s, loss_s_ + kSeamEnds_s) << story();
       ran_on_until_s_ = cell_->now_s();
     }
     run_for(kSettle_s);
@@ -248,7 +255,7 @@ class Recovery : public testing::TestWithParam<Case> {
   VirtualJob job_;
   std::unique_ptr<VirtualCell> cell_;
   std::size_t arcs_at_loss_ = 0;
-  double ran_on_until_s_ = -1;
+  double loss_s_ = 0, ran_on_until_s_ = -1;
 };
 
 TEST_P(Recovery, EndsInItsStateAndGoesOnByItsStep) {
@@ -296,6 +303,30 @@ const std::vector<Case> kCases{
      .after_s = 0.5,
      .goes_on_at = State::GuideMoving,
      .guidance = true},
+    {.name = "PcCrashInWeld",
+     .event = 80001,
+     .in = State::Welding,
+     .loss = Loss::Daemon,
+     .after_s = 1.5,
+     .down_s = 60,
+     .seam_finished = true},
+    {.name = "PcCrashInWeldAndBackAtOnce",
+     .event = 10125,
+     .in = State::Welding,
+     .loss = Loss::Daemon,
+     .after_s = 1,
+     .down_s = 1,
+     .seam_left_out = true},
+    {.name = "RwsLostInWeld",
+     .faults = {"rws_silence@weld+1.5:50"},
+     .fault = FaultCode::RobotCommand,
+     .event = 80001,
+     .seam_finished = true},
+    {.name = "RwsLostInWeldForAMoment",
+     .faults = {"rws_silence@weld+1:1.5"},
+     .fault = FaultCode::RobotCommand,
+     .event = 10125,
+     .seam_left_out = true},
     {.name = "ControllerRestartInScan",
      .faults = {"restart@scan+5:5"},
      .fault = FaultCode::EgmLost,

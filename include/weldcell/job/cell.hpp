@@ -92,9 +92,10 @@ struct RobotReply {
   std::uint64_t id = 0;
   bool ok = false;
   std::string text;  ///< cause and mend when not ok; else, of Stop and Query, the controller's latest events
-  bool running = false;  ///< of Query: RAPID executes; of Stop: it did when the stop came
-  int seams_done = 0;    ///< of Query: their arc is out
-  int seams_begun = 0;   ///< of Query: their arc was about to start
+  bool running = false;   ///< of Query: RAPID executes; of Stop: it did when the stop came
+  int seams_done = 0;     ///< of Query: their arc is out
+  int seams_begun = 0;    ///< of Query: their arc was about to start
+  int seams_allowed = 0;  ///< of Query: how many the daemon has let begin
 };
 /// A state could not be made durable. What that step would have set in motion was kept back.
 struct StorageLost {
@@ -116,7 +117,7 @@ struct Input {
 
 // ---- outputs ----
 
-enum class RobotTask : std::uint8_t { Move, OpenScan, Stop, Upload, Weld, Query };
+enum class RobotTask : std::uint8_t { Move, OpenScan, Stop, Upload, Weld, Query, Allow };
 const char* to_string(RobotTask);
 struct RobotRequest {
   std::uint64_t id = 0;
@@ -124,6 +125,7 @@ struct RobotRequest {
   kinematics::Joints joints{};  ///< Move, OpenScan: where RAPID moves first
   std::string module_text;      ///< Upload
   int skip_seams = 0;           ///< Weld
+  int allowed_seams = 0;        ///< Allow: so many seams may have begun
   bool own_only = false;        ///< Stop: nothing but weldcell's own modules
 };
 struct ImportRequest {};
@@ -272,6 +274,7 @@ class Cell {
   void watch_scan();
   void save_state();
   void settle_seams(const RobotReply& reply);
+  void weld_goes_on(const RobotReply& reply);
   void settle_stop(const RobotReply& reply);
   void chase_stop();
   void log(LogEvent::Level level, const std::string& text);

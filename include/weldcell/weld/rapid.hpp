@@ -45,9 +45,11 @@ struct RapidOptions {
   double voltage_v = 24, wirefeed = 130;  ///< in the units of the controller's arc system
 };
 
-/// RAPID text (RW6, ISO-8859-1 safe) of module `WeldcellJob`: PERS num nSeamsDone, nSeamsBegun, nSeamsToSkip
-/// and PROC WeldcellWeld() that leaves out the first nSeamsToSkip seams, with MoveAbsJ, MoveL, ArcLStart,
-/// ArcL, ArcLEnd. Targets are absolute in Base (the work object is the identity). Full literals, identifiers
+/// RAPID text (RW6, ISO-8859-1 safe) of module `WeldcellJob`: PERS num nSeamsDone, nSeamsBegun, nSeamsToSkip,
+/// nSeamsAllowed and PROC WeldcellWeld() that leaves out the first nSeamsToSkip seams, with MoveAbsJ, MoveL,
+/// ArcLStart, ArcL, ArcLEnd. Before each seam it waits until nSeamsAllowed exceeds nSeamsDone, and exits
+/// after 10 s without. Targets are absolute in Base (the work object is the identity). Full literals,
+/// identifiers
 /// <= 32, lines < 255.
 std::string rapid_module(const cell::CellSetup& cell, const std::string& job,
                          const std::vector<TorchPath>& paths, const RapidOptions& options = {});

@@ -105,6 +105,33 @@ inline std::vector<std::byte> egm_datagram(abb::egm::EgmMCIState::MCIStateType m
   return out;
 }
 
+using Mci = abb::egm::EgmMCIState;
+
+inline EgmCycle frame(Mci::MCIStateType mci, bool plan_done = false) {
+  EgmCycle cycle;
+  cycle.datagram = egm_datagram(mci);
+  cycle.report.plan_id = 7;
+  cycle.report.phase = robot::EgmPhase::Following;
+  cycle.report.plan_done = plan_done;
+  return cycle;
+}
+
+/// A ready cell to Scanning.
+inline Driver& scan(Driver& d) {
+  d.ready(false).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Start).robot_done();
+  for (int i = 0; i < 6; ++i) d.feed(frame(Mci::MCI_RUNNING));
+  return d;
+}
+
+/// A ready cell to Welding with its program started: two seams, none begun.
+inline Driver& weld(Driver& d) {
+  scan(d).feed(frame(Mci::MCI_RUNNING, true)).feed(LaserBytes{}).feed(Tick{}, 0.2);
+  auto solution = std::make_shared<Solution>();
+  solution->verdict.verdict = localize::Verdict::Weld;
+  solution->rapid = "MODULE WeldcellJob";
+  return d.feed(SolveDone{solution}).robot_done().robot_done();
+}
+
 inline bool moves(const Outputs& outputs) {
   for (const Output& o : outputs) {
     if (std::holds_alternative<StartMotion>(o)) return true;

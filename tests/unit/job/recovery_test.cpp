@@ -30,22 +30,6 @@ TEST(CellRecovery, SeamsAskedForAtAResumeAreKnownThoughPlanningIsFaster) {
   EXPECT_EQ(d.cell.status().fault, FaultCode::RobotCommand);
 }
 
-using Mci = abb::egm::EgmMCIState;
-
-EgmCycle frame(Mci::MCIStateType mci) {
-  EgmCycle cycle;
-  cycle.datagram = egm_datagram(mci);
-  cycle.report.plan_id = 7;
-  cycle.report.phase = robot::EgmPhase::Following;
-  return cycle;
-}
-
-Driver& scan(Driver& d) {
-  d.ready(false).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Start).robot_done();
-  for (int i = 0; i < 6; ++i) d.feed(frame(Mci::MCI_RUNNING));
-  return d;
-}
-
 TEST(CellRecovery, AControllerThatLeavesEgmIsAStoppedRobot) {
   Driver d;
   ASSERT_EQ(scan(d).state(), State::Scanning);
@@ -68,6 +52,81 @@ TEST(CellRecovery, AScanWithoutFramesIsALostLinkAndTellsTheControllersLog) {
   d.feed(stopped);
   EXPECT_NE(d.cell.status().fault_text.find("10013 Emergency stop"), std::string::npos);
   EXPECT_EQ(d.state(), State::Faulted);
+}
+
+/// The answer to the query that a tick asks.
+RobotReply progress(Driver& d, int done, int allowed, bool running = true) {
+  d.feed(Tick{}, 0.5);
+  const auto asked = d.of<RobotRequest>(d.last);
+  EXPECT_EQ(asked.size(), 1U);
+  RobotReply reply;
+  if (asked.empty()) return reply;
+  EXPECT_EQ(asked[0].task, RobotTask::Query);
+  reply.id = asked[0].id;
+  reply.ok = true;
+  reply.running = running;
+  reply.seams_done = reply.seams_begun = done;
+  reply.seams_allowed = allowed;
+  return reply;
+}
+
+TEST(CellRecovery, EachSeamIsLetBeginOnceTheOneBeforeHasEnded) {
+  Driver d;
+  ASSERT_EQ(weld(d).state(), State::Welding);
+  for (int done = 0; done < 2; ++done) {
+    d.feed(progress(d, done, done));
+    const auto allow = d.of<RobotRequest>(d.last);
+    ASSERT_EQ(allow.size(), 1U) << done;
+    EXPECT_EQ(allow[0].task, RobotTask::Allow);
+    EXPECT_EQ(allow[0].allowed_seams, done + 1);
+    d.robot_done();
+    d.feed(progress(d, done, done + 1));
+    EXPECT_TRUE(d.of<RobotRequest>(d.last).empty()) << "let begin twice";
+  }
+  d.feed(progress(d, 2, 2));
+  EXPECT_TRUE(d.of<RobotRequest>(d.last).empty()) << "there is no third seam";
+  d.feed(progress(d, 2, 2, false));
+  EXPECT_EQ(d.state(), State::Done);
+}
+
+TEST(CellRecovery, AProgressThatIsNotSavedLetsNoSeamBegin) {
+  Driver d;
+  weld(d).feed(progress(d, 1, 1));
+  const auto saved = std::find_if(d.last.begin(), d.last.end(),
+                                  [](const Output& o) { return std::holds_alternative<SaveState>(o); });
+  const auto allow = std::find_if(d.last.begin(), d.last.end(), [](const Output& o) {
+    const auto* r = std::get_if<RobotRequest>(&o);
+    return r != nullptr && r->task == RobotTask::Allow;
+  });
+  ASSERT_NE(allow, d.last.end());
+  EXPECT_LT(saved, allow) << "what comes before it in the step must be durable first";
+}
+
+TEST(CellRecovery, AFailedQueryWhileWeldingIsAFaultThatStops) {
+  Driver d;
+  weld(d);
+  RobotReply failed = progress(d, 0, 0);
+  failed.ok = false;
+  failed.text = "the connection was refused";
+  d.feed(failed);
+  EXPECT_EQ(d.state(), State::Faulted);
+  EXPECT_EQ(d.cell.status().fault, FaultCode::RobotCommand);
+  EXPECT_NE(d.cell.status().fault_text.find("connection was refused"), std::string::npos);
+  EXPECT_FALSE(d.cell.status().armed);
+  EXPECT_EQ(d.of<RobotRequest>(d.last).back().task, RobotTask::Stop);
+}
+
+TEST(CellRecovery, AWeldProgramThatStopsEarlyTellsTheSeamAndTheControllersEvent) {
+  Driver d;
+  weld(d);
+  RobotReply stopped = progress(d, 1, 2, false);
+  stopped.text = "50204 Motion supervision";
+  d.feed(stopped);
+  EXPECT_EQ(d.state(), State::Faulted);
+  EXPECT_EQ(d.cell.status().fault, FaultCode::ProgramStopped);
+  EXPECT_NE(d.cell.status().fault_text.find("seam 1 of 2"), std::string::npos);
+  EXPECT_NE(d.cell.status().fault_text.find("50204"), std::string::npos);
+  EXPECT_FALSE(d.cell.status().armed);
 }
 
 TEST(CellRecovery, ALostPlcStopsWhatMovesAndNothingElse) {

@@ -125,7 +125,8 @@ class Linter {
     std::smatch m;
     static const std::regex kModule("MODULE ([A-Za-z][A-Za-z0-9_]*)"),
         kProc("PROC ([A-Za-z][A-Za-z0-9_]*)\\(\\)"), kTrap("TRAP ([A-Za-z][A-Za-z0-9_]*)"),
-        kData("(PERS|CONST|VAR) ([a-z_]+) ([A-Za-z][A-Za-z0-9_]*)(:=(.*))?;"), kIf("IF .* THEN");
+        kData("(PERS|CONST|VAR) ([a-z_]+) ([A-Za-z][A-Za-z0-9_]*)(:=(.*))?;"), kIf("IF .* THEN"),
+        kWhile("WHILE .* DO");
     if (std::regex_match(code, m, kModule)) {
       out_.name = m[1];
     } else if (std::regex_match(code, m, kProc)) {
@@ -139,9 +140,11 @@ class Linter {
       data(m[1], m[2], m[3], m[5]);
     } else if (std::regex_match(code, kIf)) {
       open("ENDIF");
+    } else if (std::regex_match(code, kWhile)) {
+      open("ENDWHILE");
     } else if (code == "ERROR") {
       if (blocks_.empty() || blocks_.back() != "ENDPROC") fault("ERROR outside a routine");
-    } else if (code == "ENDPROC" || code == "ENDTRAP" || code == "ENDIF") {
+    } else if (code == "ENDPROC" || code == "ENDTRAP" || code == "ENDIF" || code == "ENDWHILE") {
       if (blocks_.empty() || blocks_.back() != code) return fault(code + " without its beginning");
       blocks_.pop_back();
     } else if (code == "ENDMODULE") {

@@ -78,7 +78,7 @@ TEST(RapidModule, ReadsBackWithoutAFaultAndKeepsEveryTarget) {
 
 TEST(RapidModule, DeclaresToolAndCountersAsTheCellStatesThem) {
   const Made made;
-  for (const char* name : {"nSeamsDone", "nSeamsBegun", "nSeamsToSkip"}) {
+  for (const char* name : {"nSeamsDone", "nSeamsBegun", "nSeamsToSkip", "nSeamsAllowed"}) {
     const auto* counter = made.module.find(name);
     ASSERT_TRUE(counter);
     EXPECT_EQ(counter->kind + " " + counter->type + " " + counter->text, "PERS num 0");
@@ -104,9 +104,10 @@ TEST(RapidModule, CountsASeamOnceItsArcIsOutAndSkipsThoseDone) {
                                 "ArcLStart p03_001", "ArcLEnd p03_002", "nSeamsDone:=nSeamsDone+1",
                                 "MoveL p03Retract", "MoveL p03Away"));
   for (int i = 1; i <= 6; ++i) {
-    EXPECT_THAT(made.text,
-                HasSubstr("IF nSeamsToSkip<" + std::to_string(i) + " THEN\n      Seam0" + std::to_string(i)));
+    EXPECT_THAT(made.text, HasSubstr("IF nSeamsToSkip<" + std::to_string(i) +
+                                     " THEN\n      WeldcellAwait;\n      Seam0" + std::to_string(i)));
   }
+  EXPECT_THAT(made.text, HasSubstr("WHILE nSeamsAllowed<=nSeamsDone DO\n      IF nTenths>=100 THEN"));
   EXPECT_THAT(made.text, HasSubstr("ConfL\\On;"));
   EXPECT_THAT(made.text, HasSubstr("SingArea\\Off;"));
   EXPECT_THAT(made.text, HasSubstr("MoveAbsJ jWeldcellHome,v500,fine"));
@@ -147,7 +148,7 @@ TEST(RapidModule, ForeignTextCannotBreakOut) {
 TEST(RapidModule, AnEmptyJobGoesHome) {
   const auto module = test::lint(rapid_module(test::test_cell(), "none", {}));
   EXPECT_THAT(module.faults, IsEmpty());
-  EXPECT_THAT(module.routines, ElementsAre("WeldcellWeld"));
+  EXPECT_THAT(module.routines, ElementsAre("WeldcellWeld", "WeldcellAwait"));
 }
 
 TEST(ResidentModule, ReadsBackWithoutAFault) {
