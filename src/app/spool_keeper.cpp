@@ -80,9 +80,9 @@ void SpoolKeeper::find_interrupted() {
     job->arrived.interrupted = left.begun;
     if (left.welding) {
       spdlog::warn(
-          "job '{}' was left while it welded: RAPID may weld on at this moment, weldcelld has not stopped "
-          "it; stop it on "
-          "the FlexPendant if it must not; Resume and Abort stop it too",
+          "job '{}' was left while it welded: RAPID may weld on at this moment, and is stopped as soon as "
+          "the "
+          "controller answers; stop it on the FlexPendant if it must not",
           found.name);
     }
     if (left.begun) {
