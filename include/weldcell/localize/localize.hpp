@@ -52,8 +52,12 @@ struct Alternative {
 /// template's centroid.
 struct Localization {
   Verdict verdict = Verdict::Reject;
-  std::string cause;   ///< stable code: "ok", "too_few_points", "ambiguous", "mirrored", "wrong_revision",
-                       ///< "member_missing", "out_of_range", "clutter", ...
+  /// Stable code. weld: "ok". rescan: "too_few_points", "one_line" (all points on one straight line),
+  /// "not_enough" (a direction of the pose stays open), "ambiguous". reject: "mirrored", "out_of_range",
+  /// "clutter", "no_fit", "bad_points", "bad_path", "bad_options" (what is no number or no sensible one),
+  /// "mean_error" (Method::Paper). rescan where the evidence is weak, else reject: "wrong_revision",
+  /// "member_missing".
+  std::string cause;
   std::string reason;  ///< in a welder's words, with one action
   Pose2 pose;          ///< Part in Base
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();

@@ -1,152 +1,21 @@
-#include "fit.hpp"
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "fit.hpp"
 #include "normal_equations.hpp"
-#include "weldcell/base/units.hpp"
+#include "rows.hpp"
 
 namespace weldcell::localize {
 
 namespace {
 
-/// A crossing along the edge itself says nothing about it; the slack covers a pose that is still turned a
-/// little wrong.
-constexpr double kAlongEdge = -0.03;
-/// Noise, a shifted member and latency let a true crossing lie this far past the end of its edge.
-constexpr double kPastEnd_mm = 1.5;
-/// Latency before its prior is known to hold; 10 ms is the longest that a working cell shows.
-constexpr double kWideLatency_ms = 10;
 constexpr double kWideInset_mm = 3;
 /// Odds that a stated prior holds, before the points speak.
 constexpr double kPriorHolds_nats = 3;
 constexpr double kFreeMember_nats = 2;
 /// So many crossings, evenly taken, tell which members are off and how far sigmas can be believed.
 constexpr std::size_t kSettlePoints = 600;
-
-Row row_of(const TemplateFields& fields, const Crossing& crossing, const Match& m, double c, double s,
-           bool inset_everywhere) {
-  const FieldEdge& edge = fields.edges()[static_cast<std::size_t>(m.edge)];
-  const Vec2& n = edge.outward;
-  const Vec2& d = crossing.direction;
-  const double across = n.x() * (c * d.x() + s * d.y()) + n.y() * (-s * d.x() + c * d.y());
-  Row row;
-  row.a = {n.x(), n.y(), n.y() * m.place.x() - n.x() * m.place.y()};
-  row.l = 1e-3 * crossing.speed_mm_s * across;
-  row.b = edge.round || inset_everywhere ? -1 : 0;
-  row.residual = m.residual_mm;
-  return row;
-}
-
-void move(CentredPose& pose, const Common& step) {
-  const double c = std::cos(pose.theta_rad), s = std::sin(pose.theta_rad);
-  pose.centre += Vec2(c * step(0) - s * step(1), s * step(0) + c * step(1));
-  pose.theta_rad = wrap_pi(pose.theta_rad + step(2));
-}
-
-bool any_speed(const std::vector<Crossing>& crossings) {
-  return std::any_of(crossings.begin(), crossings.end(), [](const Crossing& c) { return c.speed_mm_s > 0; });
-}
-
-/// What a row leaves when latency, inset and the member's shift are taken off.
-double net_residual(const TemplateFields& fields, const Row& row, const Match& m, const FitState& state) {
-  double net = row.residual - row.l * state.latency_ms - row.b * state.inset_mm;
-  if (!state.members.empty()) {
-    const FieldEdge& edge = fields.edges()[static_cast<std::size_t>(m.edge)];
-    const Vec2 arm = m.place - fields.member_centroids()[static_cast<std::size_t>(edge.member)];
-    const MemberShift& shift = state.members[static_cast<std::size_t>(edge.member)];
-    const Vec2& n = edge.outward;
-    net -= n.x() * shift.x() + n.y() * shift.y() + (n.y() * arm.x() - n.x() * arm.y()) * shift.z();
-  }
-  return net;
-}
-
-double squared_miss(double net, const Match& m) {
-  const double past = std::max(0.0, m.beyond_mm - kPastEnd_mm);
-  return net * net + past * past;
-}
-
-}  // namespace
-
-Match match(const TemplateFields& fields, const Crossing& crossing, const CentredPose& pose, double c,
-            double s) {
-  const Vec2 d = crossing.point - pose.centre;
-  Match out;
-  out.place = {c * d.x() + s * d.y(), -s * d.x() + c * d.y()};
-  const int bin = crossing.signed_step ? bin_of(crossing.inward_rad - pose.theta_rad) : kAnyBin;
-  const Vec2 inward(c * crossing.inward.x() + s * crossing.inward.y(),
-                    -s * crossing.inward.x() + c * crossing.inward.y());
-  double best = 1e300;
-  for (const std::uint16_t index : fields.near(bin, out.place)) {
-    const FieldEdge& edge = fields.edges()[index];
-    if (crossing.signed_step && -edge.outward.dot(inward) < kAlongEdge) continue;
-    const Vec2 from = out.place - edge.a;
-    const double along = from.dot(edge.direction), across = from.dot(edge.outward);
-    const double beyond = std::max({0.0, -along, along - edge.length_mm});
-    const double squared = across * across + beyond * beyond;
-    if (squared < best) {
-      best = squared;
-      out.edge = index;
-      out.residual_mm = across;
-      out.beyond_mm = beyond;
-    }
-  }
-  out.distance_mm = std::sqrt(best);
-  return out;
-}
-
-FitState polish(const TemplateFields& fields, const std::vector<Crossing>& crossings,
-                const CentredPose& start, double first_scale_mm, int* iterations) {
-  Priors priors;
-  priors.latency_ms = any_speed(crossings) ? kWideLatency_ms : 0;
-  priors.inset_mm = 0;
-  FitState state;
-  state.pose = start;
-  NormalEquations equations(fields.member_centroids(), priors);
-  double scale = first_scale_mm;
-  for (int step = 0; step < 12; ++step) {
-    const double c = std::cos(state.pose.theta_rad), s = std::sin(state.pose.theta_rad);
-    equations.clear();
-    for (const Crossing& crossing : crossings) {
-      const Match m = match(fields, crossing, state.pose, c, s);
-      if (m.edge < 0) continue;
-      const Row row = row_of(fields, crossing, m, c, s, false);
-      const double miss = squared_miss(net_residual(fields, row, m, state), m);
-      const double ratio = 1 + miss / (scale * scale);
-      equations.add(fields.edges()[static_cast<std::size_t>(m.edge)].member, row, 1 / (ratio * ratio));
-    }
-    const Common step_found = equations.solve_rigid();
-    if (!step_found.allFinite()) break;
-    move(state.pose, step_found);
-    state.latency_ms = step_found(3);
-    if (iterations != nullptr) ++*iterations;
-    const double moved = step_found.head<2>().norm() + std::abs(step_found(2)) * fields.radius_mm();
-    if (scale <= 3 && moved < 0.05) break;
-    scale = std::max(3.0, scale * 0.7);
-  }
-  return state;
-}
-
-double rough_log_likelihood(const TemplateFields& fields, const std::vector<Crossing>& crossings,
-                            const FitState& state) {
-  const double c = std::cos(state.pose.theta_rad), s = std::sin(state.pose.theta_rad);
-  const double clutter = std::exp(-kInlierGate * kInlierGate / 2);
-  double sum = 0;
-  for (const Crossing& crossing : crossings) {
-    const Match m = match(fields, crossing, state.pose, c, s);
-    double good = 0;
-    if (m.edge >= 0) {
-      const Row row = row_of(fields, crossing, m, c, s, false);
-      const double variance = 1 + crossing.sigma_mm * crossing.sigma_mm;
-      good = std::exp(-squared_miss(net_residual(fields, row, m, state), m) / (2 * variance));
-    }
-    sum += std::log(good + clutter);
-  }
-  return sum;
-}
-
-namespace {
 
 /// The loop of refine(): matches, weights, sums, solution, over and over.
 class Refinement {

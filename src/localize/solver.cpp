@@ -1,0 +1,260 @@
+#include "solver.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "decide.hpp"
+#include "evidence.hpp"
+#include "fit.hpp"
+#include "search.hpp"
+#include "weldcell/base/units.hpp"
+
+namespace weldcell::localize {
+
+namespace {
+
+constexpr std::size_t kModes = 8;
+/// Beyond this a second mode need not be looked at more closely.
+constexpr double kFarBehind_nats = 40;
+
+Pose2 part_pose(const workpiece::OutlineTemplate& outline, const CentredPose& centred) {
+  Pose2 pose{0, 0, centred.theta_rad};
+  const Vec2 t = centred.centre - pose.rotate(outline.centroid);
+  return {t.x(), t.y(), centred.theta_rad};
+}
+
+CentredPose centred_pose(const workpiece::OutlineTemplate& outline, const Pose2& pose) {
+  return {pose * outline.centroid, pose.theta_rad};
+}
+
+bool same_place(const TemplateFields& fields, const CentredPose& a, const CentredPose& b) {
+  return (a.centre - b.centre).norm() < 5 &&
+         std::abs(wrap_pi(a.theta_rad - b.theta_rad)) * fields.radius_mm() < 10;
+}
+
+struct Candidate {
+  FitState state;
+  double likelihood = 0;
+  bool turned = false;
+};
+
+/// One run of the robust method over ready crossings.
+class Solver {
+ public:
+  Solver(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
+         const std::vector<Crossing>& crossings, std::span<const PathPiece> path,
+         const LocalizeOptions& options)
+      : outline_(outline), fields_(fields), crossings_(crossings), path_(path), options_(options) {
+    box_ = {centred_pose(outline, options.planned), options.range_mm, std::min(options.range_rad, kPi),
+            Vec2(-outline.centroid)};
+    priors_.latency_ms = 1e3 * options.latency_sigma_s;
+    priors_.inset_mm = options.inset_sigma_mm;
+    priors_.member_shift_mm = options.member_shift_sigma_mm;
+    priors_.member_angle_rad = options.member_angle_sigma_rad;
+  }
+
+  /// False when no pose of the range brings a single point near an edge.
+  bool run(std::span<const EdgePoint> edges, Localization& result) {
+    medium_ = sampled(crossings_, 400);
+    collect_candidates();
+    if (candidates_.empty()) return false;
+    fit_ = refine(fields_, crossings_,
+                  polish(fields_, medium_, candidates_.front().state.pose, 4, &iterations_), priors_);
+    evidence_ = gather_evidence(fields_, path_, fit_);
+    weigh_rivals();
+    fill(result);
+    fill_points(edges, result);
+    decide({outline_, fields_, options_, crossings_, path_, fit_, evidence_, rivals_}, result);
+    return true;
+  }
+
+ private:
+  void collect_candidates() {
+    const std::vector<Crossing> few = sampled(medium_, kSearchPoints);
+    for (const Mode& mode : search(fields_, few, box_, kModes)) {
+      if (!candidates_.empty() && mode.score < 0.5 * best_score_) break;
+      best_score_ = std::max(best_score_, mode.score);
+      consider(few, mode.pose, false);
+    }
+    if (candidates_.empty()) return;
+    order();
+    add_turned(few);
+    order();
+    prefer_planned_turn();
+  }
+
+  void consider(const std::vector<Crossing>& few, const CentredPose& from, bool turned) {
+    Candidate candidate;
+    candidate.state = polish(fields_, few, from, turned ? 6 : 12, &iterations_);
+    candidate.turned = turned;
+    if (!box_.holds(candidate.state.pose, 12, rad(1.5))) return;
+    for (const Candidate& other : candidates_) {
+      if (same_place(fields_, other.state.pose, candidate.state.pose)) return;
+    }
+    candidate.likelihood = rough_log_likelihood(fields_, medium_, candidate.state);
+    candidates_.push_back(std::move(candidate));
+  }
+
+  void order() {
+    std::stable_sort(candidates_.begin(), candidates_.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.likelihood > b.likelihood; });
+  }
+
+  /// The near-symmetric images of the best pose, where the range admits them.
+  void add_turned(const std::vector<Crossing>& few) {
+    const Pose2 best = part_pose(outline_, candidates_.front().state.pose);
+    for (const workpiece::Symmetry& symmetry : outline_.symmetries) {
+      if (symmetry.gap_mm == 0) continue;
+      const CentredPose turned = centred_pose(outline_, best * symmetry.map);
+      if (box_.holds(turned, 12, rad(1.5))) consider(few, turned, true);
+    }
+  }
+
+  /// Of the images under true symmetries, which no scan can tell apart, the one least turned from planned.
+  void prefer_planned_turn() {
+    const Pose2 best = part_pose(outline_, candidates_.front().state.pose);
+    CentredPose& chosen = candidates_.front().state.pose;
+    const auto turn = [&](const CentredPose& p) {
+      return std::abs(wrap_pi(p.theta_rad - box_.planned.theta_rad));
+    };
+    for (const workpiece::Symmetry& symmetry : outline_.symmetries) {
+      if (symmetry.gap_mm != 0) continue;
+      const CentredPose image = centred_pose(outline_, best * symmetry.map);
+      if (turn(image) < turn(chosen) - 1e-6) chosen = image;
+    }
+  }
+
+  bool image_of_found(const CentredPose& pose) const {
+    if (same_place(fields_, pose, fit_.state.pose)) return true;
+    const Pose2 found = part_pose(outline_, fit_.state.pose);
+    return std::any_of(
+        outline_.symmetries.begin(), outline_.symmetries.end(), [&](const workpiece::Symmetry& s) {
+          return s.gap_mm == 0 && same_place(fields_, pose, centred_pose(outline_, found * s.map));
+        });
+  }
+
+  void weigh_rivals() {
+    const double found = fit_.log_likelihood + path_log_likelihood(evidence_);
+    for (std::size_t i = 1; i < candidates_.size(); ++i) {
+      const Candidate& candidate = candidates_[i];
+      if (candidates_.front().likelihood - candidate.likelihood > kFarBehind_nats) break;
+      if (image_of_found(candidate.state.pose)) continue;
+      Rival rival;
+      rival.fit = refine(fields_, crossings_, polish(fields_, medium_, candidate.state.pose, 4, &iterations_),
+                         priors_);
+      if (image_of_found(rival.fit.state.pose)) continue;
+      rival.turned = candidate.turned;
+      rival.gap_nats =
+          found - rival.fit.log_likelihood - path_log_likelihood(gather_evidence(fields_, path_, rival.fit));
+      rivals_.push_back(std::move(rival));
+    }
+    std::stable_sort(rivals_.begin(), rivals_.end(),
+                     [](const Rival& a, const Rival& b) { return a.gap_nats < b.gap_nats; });
+    if (rivals_.empty() || rivals_.front().gap_nats >= 0) return;
+    // The second mode explains the scan better than the first once members and path count: they change
+    // places.
+    const double gap = rivals_.front().gap_nats;
+    std::swap(fit_, rivals_.front().fit);
+    rivals_.front().gap_nats = 0;
+    for (Rival& rival : rivals_) rival.gap_nats -= gap;
+    evidence_ = gather_evidence(fields_, path_, fit_);
+  }
+
+  void fill(Localization& result) const {
+    result.pose = part_pose(outline_, fit_.state.pose);
+    result.centroid_base = fit_.state.pose.centre;
+    const Pose2 turn{0, 0, result.pose.theta_rad};
+    Eigen::Matrix3d to_base = Eigen::Matrix3d::Identity();
+    to_base.topLeftCorner<2, 2>() << std::cos(turn.theta_rad), -std::sin(turn.theta_rad),
+        std::sin(turn.theta_rad), std::cos(turn.theta_rad);
+    result.covariance = to_base * fit_.covariance.topLeftCorner<3, 3>() * to_base.transpose();
+    const bool timed =
+        priors_.latency_ms > 0 &&
+        std::any_of(crossings_.begin(), crossings_.end(), [](const Crossing& c) { return c.speed_mm_s > 0; });
+    if (timed) result.latency_s = 1e-3 * fit_.state.latency_ms;
+    result.inset_mm = fit_.state.inset_mm;
+    result.iterations = iterations_ + fit_.iterations;
+    for (const Rival& rival : rivals_) {
+      if (rival.gap_nats < kFarBehind_nats) {
+        result.alternatives.push_back({part_pose(outline_, rival.fit.state.pose), mean_distance(rival.fit)});
+      }
+    }
+    fill_members(result, to_base);
+  }
+
+  /// Edge and residual of every point given, also of those that stood twice or were too many for the fit.
+  void fill_points(std::span<const EdgePoint> edges, Localization& result) const {
+    result.points = static_cast<int>(edges.size());
+    result.edge_of_point.assign(edges.size(), -1);
+    result.residual_mm.assign(edges.size(), 0);
+    if (crossings_.size() < edges.size()) describe_all(edges, result);
+    for (std::size_t i = 0; i < crossings_.size(); ++i) {
+      const auto source = static_cast<std::size_t>(crossings_[i].source);
+      result.edge_of_point[source] = fit_.inlier[i] > 0.5 ? fit_.matches[i].edge : -1;
+      result.residual_mm[source] = fit_.matches[i].edge >= 0 ? fit_.matches[i].residual_mm : 0;
+      result.inliers += fit_.inlier[i] > 0.5;
+    }
+    result.mean_error_mm = mean_distance(fit_);
+  }
+
+  void describe_all(std::span<const EdgePoint> edges, Localization& result) const {
+    const double c = std::cos(result.pose.theta_rad), s = std::sin(result.pose.theta_rad);
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      const Crossings one = ready_crossings(edges.subspan(i, 1), options_.default_sigma_mm);
+      if (one.list.empty()) continue;
+      const Match m = match(fields_, one.list.front(), fit_.state.pose, c, s);
+      if (m.edge < 0) continue;
+      result.residual_mm[i] = m.residual_mm;
+      if (m.distance_mm <= 4 * fit_.scale * one.list.front().sigma_mm) result.edge_of_point[i] = m.edge;
+    }
+  }
+
+  double mean_distance(const Fit& fit) const {
+    double sum = 0;
+    for (const Match& m : fit.matches) sum += m.edge < 0 ? TemplateFields::kReach_mm : m.distance_mm;
+    return sum / static_cast<double>(fit.matches.size());
+  }
+
+  void fill_members(Localization& result, const Eigen::Matrix3d& to_base) const {
+    for (std::size_t m = 0; m < outline_.members.size(); ++m) {
+      MemberPose pose;
+      pose.name = outline_.member_names[m];
+      const Eigen::Vector3d shift = to_base * fit_.state.members[m];
+      pose.dx_mm = shift.x();
+      pose.dy_mm = shift.y();
+      pose.dtheta_rad = shift.z();
+      pose.covariance = to_base * fit_.member_covariance[m] * to_base.transpose();
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(
+          Eigen::Matrix2d(pose.covariance.topLeftCorner<2, 2>()));
+      pose.sigma_mm = std::sqrt(std::max(0.0, axes.eigenvalues()(1)));
+      pose.points = fit_.member_points[m];
+      result.members.push_back(std::move(pose));
+    }
+  }
+
+  const workpiece::OutlineTemplate& outline_;
+  const TemplateFields& fields_;
+  const std::vector<Crossing>& crossings_;
+  std::span<const PathPiece> path_;
+  const LocalizeOptions& options_;
+  SearchBox box_;
+  Priors priors_;
+  std::vector<Crossing> medium_;  ///< at most 400, evenly
+  double best_score_ = 0;
+  int iterations_ = 0;
+  std::vector<Candidate> candidates_;
+  Fit fit_;
+  Evidence evidence_;
+  std::vector<Rival> rivals_;
+};
+
+}  // namespace
+
+bool solve_robust(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
+                  const std::vector<Crossing>& crossings, std::span<const EdgePoint> edges,
+                  std::span<const PathPiece> path, const LocalizeOptions& options, Localization& result) {
+  return Solver(outline, fields, crossings, path, options).run(edges, result);
+}
+
+}  // namespace weldcell::localize
