@@ -129,12 +129,16 @@ int Alternatives::unseen_on(const std::vector<VisibleEdge>& edges, const Region&
   return out;
 }
 
-double Alternatives::score(const std::vector<Polygon>& members, const Region& region) const {
+std::vector<VisibleEdge> Alternatives::edges_within(const std::vector<Polygon>& members, const Box2& box) {
   std::vector<VisibleEdge> edges;
   for (std::size_t m = 0; m < members.size(); ++m) {
-    if (members[m].empty() || apart(bounds(members[m]), region.box)) continue;
+    if (members[m].empty() || apart(bounds(members[m]), box)) continue;
     for (const VisibleEdge& edge : workpiece::visible_edges(members, m)) edges.push_back(edge);
   }
+  return edges;
+}
+
+double Alternatives::explained_nats(const std::vector<VisibleEdge>& edges, const Region& region) const {
   struct Line {
     Vec2 a, d, n;
     double length;
@@ -151,7 +155,19 @@ double Alternatives::score(const std::vector<Polygon>& members, const Region& re
       return along >= -kOnEdge_mm && along <= e.length + kOnEdge_mm;
     });
   });
-  return point_nats_ * static_cast<double>(explained) - unseen_nats_ * unseen_on(edges, region);
+  return point_nats_ * static_cast<double>(explained);
+}
+
+double Alternatives::score(const std::vector<Polygon>& members, const Region& region) const {
+  const std::vector<VisibleEdge> edges = edges_within(members, region.box);
+  return explained_nats(edges, region) - unseen_nats_ * unseen_on(edges, region);
+}
+
+double Alternatives::whole() const {
+  Region all;
+  all.box = {Vec2::Constant(-1e9), Vec2::Constant(1e9)};
+  all.spots = spots_;
+  return explained_nats(edges_within(members_, all.box), all);
 }
 
 double Alternatives::missing(int member) const {

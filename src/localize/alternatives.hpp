@@ -33,6 +33,11 @@ class Alternatives {
   /// Log-likelihood of a part without the member over the drawing as it is, nats.
   double missing(int member) const;
 
+  /// Log-likelihood of the points alone, with the members where the fit has them, up to what all fits of the
+  /// same crossings share, nats. Sides that a member pulled off its joint lays bare count as edges here, but
+  /// nobody has to have seen them: a narrow slot hides both of its sides.
+  double whole() const;
+
   static constexpr double kLeast_mm = 4, kMost_mm = 60;
 
  private:
@@ -57,6 +62,9 @@ class Alternatives {
   };
 
   Region around(std::size_t member) const;
+  static std::vector<workpiece::VisibleEdge> edges_within(const std::vector<Polygon>& members,
+                                                          const Box2& box);
+  double explained_nats(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
   double score(const std::vector<Polygon>& members, const Region& region) const;
   int unseen_on(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
   std::vector<Vote> votes(std::size_t member, const Region& region, bool loosely) const;

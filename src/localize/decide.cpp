@@ -27,6 +27,8 @@ constexpr double kNothing_nats = -1e300;
 /// One of some hundred places of some members, on a part that is hardly ever wrong.
 constexpr double kDisplaced_nats = 9;
 constexpr double kDoubtful_nats = 7;
+/// Two sigmas at most of how far two members are shifted against each other.
+constexpr double kEitherSlack_mm = 1;
 constexpr double kMinInlierShare = 0.35;
 constexpr double kMinRate = 0.5;
 /// What a pose must be known to (two sigmas) when no weld says so more exactly.
@@ -150,6 +152,16 @@ bool member_elsewhere(const Situation& s, Localization& result) {
 }
 
 bool member_off(const Situation& s, Localization& result) {
+  if (const auto& either = s.fit.either;
+      either && either->apart_mm > s.options.max_member_shift_mm + kEitherSlack_mm) {
+    say(result, Verdict::Reject, "wrong_revision",
+        fmt::format(
+            "{} or {} lies {} off its place on the drawing, more than the allowed {}. Set it right or "
+            "check the revision of drawing {}.",
+            member_name(s, either->first.member), member_name(s, either->second.member),
+            millimetres(either->apart_mm), millimetres(s.options.max_member_shift_mm), s.outline.name));
+    return true;
+  }
   for (std::size_t m = 0; m < result.members.size(); ++m) {
     const MemberPose& pose = result.members[m];
     if (pose.points < 2) continue;
@@ -200,6 +212,14 @@ bool too_vague(const Situation& s, Localization& result) {
   const double bound_rad = std::max(kPoseBound_rad, 1.0 / std::max(s.outline.radius_mm, 1.0));
   if (proven && 2 * std::sqrt(std::max(largest, 0.0)) <= kPoseBound_mm && 2.5 * sigma_rad <= bound_rad)
     return false;
+  if (const auto& either = s.fit.either) {
+    say(result, Verdict::Rescan, "not_enough",
+        fmt::format("{} or {} lies {} off its place on the drawing, and the scan does not tell which. Scan "
+                    "across the joints of both, or set it right.",
+                    member_name(s, either->first.member), member_name(s, either->second.member),
+                    millimetres(either->apart_mm)));
+    return true;
+  }
   const int edge = most_telling_edge(s, s.fit.covariance.topLeftCorner<3, 3>());
   say(result, Verdict::Rescan, "not_enough",
       fmt::format("Not enough was seen to place the part (known to {} and {}). Scan across the {} again.",

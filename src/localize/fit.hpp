@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "crossings.hpp"
@@ -41,11 +42,24 @@ struct FitState {
   std::vector<MemberShift> members;
 };
 
-struct Fit {
+struct Estimate {
   FitState state;
   /// Of (x, y, theta, latency ms, inset mm), part axes about the centroid, mm and rad.
   Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
   std::vector<Eigen::Matrix3d> member_covariance;
+};
+
+/// Two members of which one is far off its place, and the points on the drawing's edges do not tell which.
+struct Either {
+  struct Reading {
+    int member = -1;  ///< the one that is off
+    Estimate estimate;
+  };
+  Reading first, second;
+  double apart_mm = 0;  ///< how far they are shifted against each other
+};
+
+struct Fit : Estimate {
   std::vector<int> member_points;
   std::vector<Match> matches;     ///< one per crossing, at the final pose
   std::vector<double> residuals;  ///< after latency, inset and member shifts
@@ -53,6 +67,9 @@ struct Fit {
   double scale = 1;           ///< residuals against the stated sigmas; 1 when these were honest or too large
   double log_likelihood = 0;  ///< nats, against the same points being all on edges without error
   int iterations = 0;
+  /// When either of two members may be the one that is off; the estimate is the first one's, its
+  /// covariance the mean square about it over both.
+  std::optional<Either> either;
 };
 
 /// Geman-McClure from 12 mm down to 3 mm over the given crossings; members rigid. Returns the pose and the
@@ -67,6 +84,10 @@ double rough_log_likelihood(const TemplateFields& fields, const std::vector<Cros
 /// The full estimate from a polished state.
 Fit refine(const TemplateFields& fields, const std::vector<Crossing>& crossings, const FitState& start,
            const Priors& priors);
+
+/// Takes one estimate for the fit's own and matches the crossings anew; both must explain the points alike.
+void settle_on(const TemplateFields& fields, const std::vector<Crossing>& crossings, const Estimate& estimate,
+               Fit& fit);
 
 /// Distance, in sigmas, at which a point is as likely clutter as a crossing.
 inline constexpr double kInlierGate = 3.4;

@@ -43,6 +43,8 @@ class NormalEquations {
   /// Other priors over the same sums.
   void set_priors(const Priors& priors) { priors_ = priors; }
 
+  /// Whether any row belongs to the member.
+  bool touches(std::size_t member) const { return sums_[member](0, 0) + sums_[member](1, 1) > 0; }
   /// Common parameters alone, members rigid.
   Common solve_rigid() const;
   /// With member shifts of prior k * tolerance; members flagged free have a wide prior instead. k = 0: rigid.

@@ -14,6 +14,8 @@ constexpr double kWideInset_mm = 3;
 /// Odds that a stated prior holds, before the points speak.
 constexpr double kPriorHolds_nats = 3;
 constexpr double kFreeMember_nats = 2;
+/// Odds of about 1000 : 1 tell which of two members is off.
+constexpr double kTellsMembers_nats = 7;
 /// So many crossings, evenly taken, tell which members are off and how far sigmas can be believed.
 constexpr std::size_t kSettlePoints = 600;
 
@@ -56,6 +58,7 @@ class Refinement {
   }
   Fit run() {
     for (int step = 0; step < 4; ++step) iterate(step);
+    weigh_other_members();
     finish();
     return std::move(fit_);
   }
@@ -209,20 +212,79 @@ class Refinement {
     place();
     NormalEquations equations(fields_.member_centroids(), priors_);
     weigh_mixture(equations);
-    take(solve_over_latency(equations));
+    take(solve_over_latency(equations, free_));
     if (step == 1 || step == 2) rescale();
   }
 
   /// A latency outside its prior must not bend the pose: its stated prior and a wide one stand side by side,
   /// and the evidence, which charges the wide one for what it allows, weighs them.
-  Solution solve_over_latency(NormalEquations& equations) const {
-    Solution stated = equations.solve_over_scales(free_);
+  Solution solve_over_latency(NormalEquations& equations, const std::vector<bool>& free_members) const {
+    equations.set_priors(priors_);
+    Solution stated = equations.solve_over_scales(free_members);
     if (priors_.latency_ms <= 0) return stated;
     Priors wide = priors_;
     wide.latency_ms = kWideLatency_ms;
     equations.set_priors(wide);
-    Solution free = equations.solve_over_scales(free_);
+    Solution free = equations.solve_over_scales(free_members);
     return mean_of({stated, free}, {stated.log_evidence, free.log_evidence});
+  }
+
+  /// A rail pulled off its rungs looks the same as the rest of the part pulled off that rail. Where another
+  /// member set free instead explains the points about as well, the covariance holds the spread between both.
+  void weigh_other_members() {
+    if (std::count(free_.begin(), free_.end(), true) != 1) return;
+    const auto held = static_cast<std::size_t>(std::find(free_.begin(), free_.end(), true) - free_.begin());
+    place();
+    NormalEquations equations(fields_.member_centroids(), priors_);
+    weigh_mixture(equations);
+    const Solution stated = solve_over_latency(equations, free_);
+    std::size_t other = held;
+    Solution best;
+    best.log_evidence = stated.log_evidence - kTellsMembers_nats;
+    for (std::size_t m = 0; m < free_.size(); ++m) {
+      if (m == held || !equations.touches(m)) continue;
+      std::vector<bool> swapped(free_.size(), false);
+      swapped[m] = true;
+      Solution found = solve_over_latency(equations, swapped);
+      if (found.log_evidence <= best.log_evidence) continue;
+      other = m;
+      best = std::move(found);
+    }
+    if (other == held) return;
+    Either either{{static_cast<int>(held), after(stated)},
+                  {static_cast<int>(other), after(best)},
+                  stated.members[held].shift.head<2>().norm()};
+    Solution answer = mean_of({stated, best}, {stated.log_evidence, best.log_evidence});
+    spread_about(stated, answer);
+    take(answer);
+    fit_.either = std::move(either);
+  }
+
+  /// The likelier reading instead of the mean, which would be right in neither case; the covariance becomes
+  /// the mean square about it.
+  static void spread_about(const Solution& chosen, Solution& mean) {
+    const Common off = chosen.common - mean.common;
+    mean.common = chosen.common;
+    mean.covariance += off * off.transpose();
+    for (std::size_t m = 0; m < mean.members.size(); ++m) {
+      const MemberShift member_off = chosen.members[m].shift - mean.members[m].shift;
+      mean.members[m].shift = chosen.members[m].shift;
+      mean.members[m].covariance += member_off * member_off.transpose();
+    }
+  }
+
+  /// What a solution leads to from here.
+  Estimate after(const Solution& solution) const {
+    Estimate out = fit_;
+    move(out.state.pose, solution.common);
+    out.state.latency_ms = solution.common(3);
+    out.state.inset_mm = solution.common(4);
+    out.covariance = solution.covariance;
+    for (std::size_t m = 0; m < free_.size(); ++m) {
+      out.state.members[m] = solution.members[m].shift;
+      out.member_covariance[m] = solution.members[m].covariance;
+    }
+    return out;
   }
 
   /// Residuals larger than stated widen everything; smaller ones are not believed.
@@ -240,13 +302,7 @@ class Refinement {
 
   void take(const Solution& solution) {
     if (!solution.common.allFinite()) return;
-    move(fit_.state.pose, solution.common);
-    fit_.state.latency_ms = solution.common(3);
-    fit_.state.inset_mm = solution.common(4);
-    for (std::size_t m = 0; m < free_.size(); ++m) fit_.state.members[m] = solution.members[m].shift;
-    fit_.covariance = solution.covariance;
-    fit_.member_covariance.resize(free_.size());
-    for (std::size_t m = 0; m < free_.size(); ++m) fit_.member_covariance[m] = solution.members[m].covariance;
+    static_cast<Estimate&>(fit_) = after(solution);
     ++fit_.iterations;
   }
 
@@ -300,6 +356,14 @@ Fit refine(const TemplateFields& fields, const std::vector<Crossing>& crossings,
     all.adopt(coarse);
   }
   return all.run();
+}
+
+void settle_on(const TemplateFields& fields, const std::vector<Crossing>& crossings, const Estimate& estimate,
+               Fit& fit) {
+  static_cast<Estimate&>(fit) = estimate;
+  const CentredPose& pose = fit.state.pose;
+  const double c = std::cos(pose.theta_rad), s = std::sin(pose.theta_rad);
+  for (std::size_t i = 0; i < crossings.size(); ++i) fit.matches[i] = match(fields, crossings[i], pose, c, s);
 }
 
 }  // namespace weldcell::localize

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "alternatives.hpp"
 #include "decide.hpp"
 #include "evidence.hpp"
 #include "fit.hpp"
@@ -17,6 +18,8 @@ namespace {
 constexpr std::size_t kModes = 8;
 /// Beyond this a second mode need not be looked at more closely.
 constexpr double kFarBehind_nats = 40;
+/// At least two points, so that no stray one alone tells which of two members is off.
+constexpr double kTellsMembers_nats = 12;
 
 Pose2 part_pose(const workpiece::OutlineTemplate& outline, const CentredPose& centred) {
   Pose2 pose{0, 0, centred.theta_rad};
@@ -63,6 +66,7 @@ class Solver {
                   polish(fields_, medium_, candidates_.front().state.pose, 4, &iterations_), priors_);
     evidence_ = gather_evidence(fields_, path_, fit_);
     weigh_rivals();
+    tell_member_off();
     fill(result);
     fill_points(edges, result);
     decide({outline_, fields_, options_, crossings_, path_, fit_, evidence_, rivals_}, result);
@@ -158,6 +162,23 @@ class Solver {
     std::swap(fit_, rivals_.front().fit);
     rivals_.front().gap_nats = 0;
     for (Rival& rival : rivals_) rival.gap_nats -= gap;
+    evidence_ = gather_evidence(fields_, path_, fit_);
+  }
+
+  /// Which of two members is off its place: a joint that it has left open shows the sides that the drawing
+  /// hides, at another place for the one than for the other.
+  void tell_member_off() {
+    if (!fit_.either || path_.empty()) return;
+    const auto weigh = [&](const Either::Reading& reading) {
+      Fit fit = fit_;
+      settle_on(fields_, crossings_, reading.estimate, fit);
+      return Alternatives(outline_, crossings_, path_, fit, evidence_).whole();
+    };
+    const Either either = *fit_.either;
+    const double gain = weigh(either.first) - weigh(either.second);
+    if (std::abs(gain) < kTellsMembers_nats) return;
+    settle_on(fields_, crossings_, (gain > 0 ? either.first : either.second).estimate, fit_);
+    fit_.either.reset();
     evidence_ = gather_evidence(fields_, path_, fit_);
   }
 
