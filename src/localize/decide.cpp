@@ -27,8 +27,6 @@ constexpr double kNothing_nats = -1e300;
 /// One of some hundred places of some members, on a part that is hardly ever wrong.
 constexpr double kDisplaced_nats = 9;
 constexpr double kDoubtful_nats = 7;
-/// Two sigmas at most of how far two members are shifted against each other.
-constexpr double kEitherSlack_mm = 1;
 constexpr double kMinInlierShare = 0.35;
 constexpr double kMinRate = 0.5;
 /// What a pose must be known to (two sigmas) when no weld says so more exactly.

@@ -28,6 +28,10 @@ struct Situation {
   const std::vector<Rival>& rivals;
 };
 
+/// Two sigmas at most of how far two members are shifted against each other: beyond max_member_shift_mm and
+/// this a part is refused whichever of them is off.
+inline constexpr double kEitherSlack_mm = 1;
+
 /// Sets verdict, cause and reason of the result, whose figures are already filled.
 void decide(const Situation& situation, Localization& result);
 

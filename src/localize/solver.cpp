@@ -169,6 +169,7 @@ class Solver {
   /// hides, at another place for the one than for the other.
   void tell_member_off() {
     if (!fit_.either || path_.empty()) return;
+    if (fit_.either->apart_mm > options_.max_member_shift_mm + kEitherSlack_mm) return;
     const auto weigh = [&](const Either::Reading& reading) {
       Fit fit = fit_;
       settle_on(fields_, crossings_, reading.estimate, fit);
