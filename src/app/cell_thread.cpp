@@ -47,7 +47,11 @@ bool sets_in_motion(const job::Output& output) {
 CellThread::CellThread(Wiring& wiring, std::string arm_yaml)
     : wiring_(wiring),
       arm_yaml_(std::move(arm_yaml)),
-      cell_(wiring.config.setup, wiring.config.laser_format, wiring.config.plc_required) {}
+      cell_(wiring.config.setup, wiring.config.laser_format, wiring.config.plc_required) {
+  job::CellMemory memory = cell_.memory();
+  memory.watches_latency = true;
+  cell_.recall(memory);
+}
 
 void CellThread::run() {
   while (!wiring_.stopping.load(std::memory_order_relaxed)) {

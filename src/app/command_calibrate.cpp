@@ -29,6 +29,7 @@ constexpr double kAcross = 0.7;     // |cosine| between travel and normal: an ob
 struct Source {
   std::vector<GaugeCrossing> crossings;
   std::optional<double> latency_ms;
+  std::optional<files::LatencyConditions> ran;  ///< what the records' cell stated; a CSV does not say
 };
 
 /// Every outline edge of the localized part serves as a gauge edge of its own; each record has its own
@@ -47,6 +48,8 @@ Status take_record(const std::string& path, const std::string& bytes, Source& so
   if (source.latency_ms && std::abs(*source.latency_ms - laser.latency_ms) > 1e-9)
     return Error{"calibrate.record", path, "the records ran with different latencies", "take them apart"};
   source.latency_ms = laser.latency_ms;
+  source.ran = {laser.rate_hz, wire::to_string(outcome->laser_format.dialect), "", outcome->setup.arm.name,
+                ""};
   const Pose2& pose = solution->found.pose;
   for (const EdgePoint& e : solution->evidence.edges) {
     if (e.shadowed || e.speed_mm_s <= 0) continue;
@@ -150,6 +153,24 @@ Status apply(const std::string& cell_file, const files::CellConfig& config, doub
   return write_file_durably(cell_file, *text);
 }
 
+/// The latency belongs to what the records ran with; in another cell it would be a wrong one.
+Status same_conditions(const Source& source, const files::CellConfig& config, const std::string& cell_file) {
+  if (!source.ran) return Done{};
+  const auto differs = [&](const char* what, const std::string& then, const std::string& now) {
+    return Error{"calibrate.conditions", cell_file,
+                 fmt::format("the records ran with {} {}, the cell file says {}", what, then, now),
+                 "apply it to the cell file that the records ran with, or scan anew"};
+  };
+  const double rate_hz = config.setup.laser.rate_hz;
+  if (std::abs(source.ran->rate_hz - rate_hz) > 1e-6 * rate_hz)
+    return differs("rate_hz", fmt::format("{:g}", source.ran->rate_hz), fmt::format("{:g}", rate_hz));
+  const std::string dialect = wire::to_string(config.laser_format.dialect);
+  if (source.ran->dialect != dialect) return differs("dialect", source.ran->dialect, dialect);
+  if (source.ran->robot != config.setup.arm.name)
+    return differs("robot", source.ran->robot, config.setup.arm.name);
+  return Done{};
+}
+
 int tell(const Error& error) {
   std::fprintf(stderr, "%s\n", error.text().c_str());
   return error.code == "calibrate.latency" ? 1 : 2;
@@ -178,7 +199,7 @@ int command_calibrate(Arguments arguments) {
   if (!base_given) return 2;
   std::optional<files::CellConfig> config;
   if (line.has("cell")) {
-    auto read = files::read_cell_file(line.value("cell"));
+    auto read = files::read_cell_file(line.value("cell"), files::StaleLatency::Taken);
     if (const auto* faults = std::get_if<files::Faults>(&read)) {
       std::fputs(files::text(*faults).c_str(), stderr);
       return 78;
@@ -201,6 +222,8 @@ int command_calibrate(Arguments arguments) {
     print(*fit, source.crossings, base_ms);
   }
   if (!line.has("apply")) return 0;
+  if (const Status same = same_conditions(source, *config, line.value("cell")); !same.ok())
+    return tell(same.error());
   const Status applied = apply(line.value("cell"), *config, base_ms + fit->latency_ms, fit->sigma_ms());
   if (!applied.ok()) return tell(applied.error());
   std::fprintf(stderr, "%s: latency_ms %.4f written\n", line.value("cell").c_str(),

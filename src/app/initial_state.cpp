@@ -11,7 +11,10 @@ std::string memory_json(const job::CellMemory& m) {
                         {"next_request", m.next_request},
                         {"last_sequence", m.last_sequence},
                         {"sequence_known", m.sequence_known},
-                        {"selected_job", m.selected_job}}
+                        {"selected_job", m.selected_job},
+                        {"watches_latency", m.watches_latency},
+                        {"latency_drift_ms", m.latency_drift_ms},
+                        {"latency_jobs", m.latency_jobs}}
       .dump();
 }
 
@@ -26,6 +29,9 @@ job::CellMemory memory_from_json(const std::string& text) {
   m.last_sequence = json.value("last_sequence", m.last_sequence);
   m.sequence_known = json.value("sequence_known", false);
   m.selected_job = json.value("selected_job", 0);
+  m.watches_latency = json.value("watches_latency", false);
+  m.latency_drift_ms = json.value("latency_drift_ms", 0.0);
+  m.latency_jobs = json.value("latency_jobs", 0);
   return m;
 }
 

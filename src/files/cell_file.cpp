@@ -106,7 +106,7 @@ void read_top(Map& top, const std::string& robots_dir, CellConfig& out) {
 }  // namespace
 
 std::variant<CellConfig, Faults> parse_cell(std::string_view text, const std::string& name,
-                                            const std::string& robots_dir) {
+                                            const std::string& robots_dir, StaleLatency stale) {
   auto document = parse_document(text, name);
   if (auto* faults = std::get_if<Faults>(&document)) return std::move(*faults);
   Faults faults;
@@ -115,17 +115,18 @@ std::variant<CellConfig, Faults> parse_cell(std::string_view text, const std::st
   out.path = name;
   out.text = text;
   read_top(top, robots_dir, out);
-  if (faults.empty()) check_latency_conditions(std::get<Node>(document), out, name, faults);
+  if (faults.empty() && stale == StaleLatency::Fault)
+    check_latency_conditions(std::get<Node>(document), out, name, faults);
   if (!faults.empty()) return in_order(std::move(faults));
   if (out.cad_cache_dir.empty()) out.cad_cache_dir = out.state_dir + "/cad";
   return out;
 }
 
-std::variant<CellConfig, Faults> read_cell_file(const std::string& path) {
+std::variant<CellConfig, Faults> read_cell_file(const std::string& path, StaleLatency stale) {
   auto text = read_text_file(path);
   if (auto* faults = std::get_if<Faults>(&text)) return std::move(*faults);
   const fs::path folder = fs::absolute(path).parent_path();
-  auto parsed = parse_cell(std::get<std::string>(text), path, (folder / "robots").string());
+  auto parsed = parse_cell(std::get<std::string>(text), path, (folder / "robots").string(), stale);
   if (auto* config = std::get_if<CellConfig>(&parsed)) {
     for (std::string* named :
          {&config->spool_dir, &config->state_dir, &config->cad_cache_dir, &config->rws_password_file}) {

@@ -59,8 +59,8 @@ Outputs Cell::step(const Input& input) {
 }
 
 CellMemory Cell::memory() const {
-  return {status_.state,  status_.armed,   status_.links, next_request_,
-          last_sequence_, sequence_known_, selected_job_};
+  return {status_.state,   status_.armed, status_.links,    next_request_,     last_sequence_,
+          sequence_known_, selected_job_, watches_latency_, latency_drift_ms_, latency_jobs_};
 }
 
 void Cell::recall(const CellMemory& memory) {
@@ -71,6 +71,10 @@ void Cell::recall(const CellMemory& memory) {
   last_sequence_ = memory.last_sequence;
   sequence_known_ = memory.sequence_known;
   selected_job_ = memory.selected_job;
+  watches_latency_ = memory.watches_latency;
+  latency_drift_ms_ = memory.latency_drift_ms;
+  latency_jobs_ = memory.latency_jobs;
+  latency_drifted_ = latency_beyond();
   refresh_plc();
 }
 
@@ -307,6 +311,7 @@ void Cell::on(const SolveDone& done) {
   if (status_.state != State::Localizing) return;
   solution_ = done.solution;
   failure_ = solution_->verdict.reason;
+  if (watches_latency_) watch_laser();
   fire(Event::Solved);
 }
 

@@ -446,6 +446,7 @@ void Cell::refresh_plc() {
   plc.fault_code = faulted                               ? static_cast<std::uint16_t>(status_.fault)
                    : status_.state == State::Interrupted ? wire::kAlarmInterrupted
                    : status_.state == State::Failed      ? wire::kAlarmJobFailed
+                   : latency_drifted_                    ? wire::kAlarmLatency
                                                          : std::uint16_t{0};
   plc.fault_detail = faulted ? static_cast<std::int32_t>(resume_state_) : 0;
   const wire::PlcAlarm* alarm = wire::plc_alarm(plc.fault_code);

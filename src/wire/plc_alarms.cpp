@@ -36,6 +36,9 @@ constexpr PlcAlarm kAlarms[] = {
      "a job was found unfinished when the cell started", "make the cell safe; Arm and Resume, or Abort"},
     {kAlarmJobFailed, "job failed", PlcSeverity::Message, "the last job ended without all its welds",
      "read its report, weld manually; Reset"},
+    {kAlarmLatency, "laser latency drifted", PlcSeverity::Warning,
+     "the last jobs found another latency than the cell file states, by more than twice its sigma",
+     "measure it (weldcell calibrate latency); jobs go on, their bounds take the drift in"},
 };
 
 constexpr bool ascending() {

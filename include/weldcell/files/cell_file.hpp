@@ -65,11 +65,17 @@ struct CellConfig {
   RealTime realtime = RealTime::Try;
 };
 
+/// A latency that was measured under other conditions than the cell states now: a fault, but for who measures
+/// it anew.
+enum class StaleLatency { Fault, Taken };
+
 /// Reads and checks; relative paths are resolved against the file's folder. All faults at once.
-std::variant<CellConfig, Faults> read_cell_file(const std::string& path);
+std::variant<CellConfig, Faults> read_cell_file(const std::string& path,
+                                                StaleLatency stale = StaleLatency::Fault);
 /// The same from text, for replay; `name` stands in the faults.
 std::variant<CellConfig, Faults> parse_cell(std::string_view text, const std::string& name,
-                                            const std::string& robots_dir);
+                                            const std::string& robots_dir,
+                                            StaleLatency stale = StaleLatency::Fault);
 
 /// An arm model by its name from <robots_dir>/<name>.yaml.
 std::variant<kinematics::ArmModel, Faults> read_arm_file(const std::string& path);

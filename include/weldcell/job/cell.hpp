@@ -197,6 +197,11 @@ struct CellMemory {
   std::uint16_t last_sequence = 0;
   bool sequence_known = false;
   std::int32_t selected_job = 0;
+  /// The residual latency that localizations find, averaged over the last ten or so; false in records of
+  /// before, which watched nothing.
+  bool watches_latency = false;
+  double latency_drift_ms = 0;
+  int latency_jobs = 0;
 };
 
 /// Timeouts in which the world must answer. Virtual or real seconds.
@@ -272,6 +277,10 @@ class Cell {
   void begin_scan();
   void enter(State state);
   void watch_scan();
+  /// After a localization: whether the laser's clock and its latency are what the cell file says.
+  void watch_laser();
+  double latency_limit_ms() const;
+  bool latency_beyond() const;
   void save_state();
   void settle_seams(const RobotReply& reply);
   void weld_goes_on(const RobotReply& reply);
@@ -320,6 +329,9 @@ class Cell {
   bool sequence_known_ = false;
   std::int32_t selected_job_ = 0;  ///< by the PLC; 0 = the spool's order
   bool cleared_ = false;           ///< a person has acknowledged the fault or the interruption
+  bool watches_latency_ = false, latency_drifted_ = false;
+  double latency_drift_ms_ = 0;
+  int latency_jobs_ = 0;
 };
 
 }  // namespace weldcell::job

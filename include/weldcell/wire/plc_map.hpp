@@ -83,6 +83,7 @@ const PlcAlarm* plc_alarm(std::uint16_t number);
 /// Alarms that are a state of the job and no fault in it.
 inline constexpr std::uint16_t kAlarmInterrupted = 61;
 inline constexpr std::uint16_t kAlarmJobFailed = 70;
+inline constexpr std::uint16_t kAlarmLatency = 71;
 
 enum class PlcType : std::uint8_t { Word, Long, Real };
 

@@ -49,6 +49,16 @@ TEST(CellFile, ALatencyUnderOtherConditionsIsRefusedWithItsLine) {
   EXPECT_EQ((*faults)[0].key, "laser.latency_measured.rate_hz");
   EXPECT_EQ((*faults)[1].key, "laser.latency_measured.filter");
   EXPECT_GT((*faults)[0].line, 20);
+  // Who measures anew must be able to read it.
+  const auto changed =
+      with_keys(std::get<std::string>(text), "laser",
+                {{"latency_measured",
+                  "{date: x, rate_hz: 1500, dialect: data28, filter: none, robot: irb2600_12_185}"}});
+  ASSERT_TRUE(changed.ok());
+  const std::string robots = std::string(WELDCELL_CONFIG) + "/robots";
+  EXPECT_TRUE(std::holds_alternative<Faults>(parse_cell(*changed, "cell.yaml", robots)));
+  EXPECT_TRUE(
+      std::holds_alternative<CellConfig>(parse_cell(*changed, "cell.yaml", robots, StaleLatency::Taken)));
 }
 
 }  // namespace

@@ -182,6 +182,36 @@ TEST(Cell, AFaultIsClearedToStoppedAndAHoldIsHeld) {
   EXPECT_EQ(d.state(), State::Faulted);
 }
 
+TEST(Cell, ALatencyThatDriftsIsToldOnceAndShownToThePlc) {
+  Driver d;
+  d.ready(false);
+  const auto warnings_of = [&](double latency_ms, bool watched) {
+    CellMemory memory = d.cell.memory();
+    memory.state = State::Localizing;
+    memory.watches_latency = watched;
+    d.cell.recall(memory);
+    auto solution = std::make_shared<Solution>();
+    solution->verdict.verdict = localize::Verdict::Weld;
+    solution->found.latency_s = latency_ms * 1e-3;
+    d.feed(SolveDone{solution});
+    EXPECT_EQ(d.state(), State::Uploading);
+    const auto events = d.of<LogEvent>(d.last);
+    return std::count_if(events.begin(), events.end(), [](const LogEvent& e) {
+      return e.text.find("latency has drifted") != std::string::npos;
+    });
+  };
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(warnings_of(3, false), 0) << "a record of before";
+  EXPECT_EQ(warnings_of(1.6, true), 0);
+  EXPECT_EQ(warnings_of(1.6, true), 0);
+  EXPECT_EQ(d.cell.status().plc.fault_code, 0);
+  EXPECT_EQ(warnings_of(1.6, true), 1) << "three jobs agree: more than twice the sigma of 0.5 ms";
+  EXPECT_EQ(d.cell.status().plc.fault_code, wire::kAlarmLatency);
+  EXPECT_EQ(d.cell.status().plc.fault_severity, wire::PlcSeverity::Warning);
+  EXPECT_EQ(warnings_of(1.6, true), 0) << "told already";
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(warnings_of(0, true), 0);
+  EXPECT_EQ(d.cell.status().plc.fault_code, 0);
+}
+
 TEST(Cell, SelectPutsAReadyJobBackUnbegun) {
   Driver d;
   d.ready(true).order(wire::PlcCommand::Arm);
