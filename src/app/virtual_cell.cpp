@@ -73,6 +73,7 @@ struct VirtualCell::State {
   void serve_robot();
   void watch_links();
   void note_armed();
+  bool served() const { return daemon && !stalled; }
 
   const files::CellConfig& config;
   const sim::Scene& scene;
@@ -86,6 +87,7 @@ struct VirtualCell::State {
 
   HostTime now;
   std::uint64_t cycles = 0, jitter = 1;
+  bool stalled = false;
   bool laser_up = false, rws_up = false, plc_beats = false, was_armed = true;
   std::deque<sim::LaserBlock> wire;
   std::vector<sim::MotionSpan> unarmed;
@@ -150,10 +152,10 @@ void VirtualCell::State::advance() {
     if (!laser.inject(fault.kind, fault.duration_s)) controller.inject(fault.kind, fault.duration_s);
   }
   controller.step(now);
-  if (const auto datagram = controller.egm_datagram(); datagram && daemon) exchange_egm(*datagram);
+  if (const auto datagram = controller.egm_datagram(); datagram && served()) exchange_egm(*datagram);
   deliver_laser();
   ++cycles;
-  if (daemon) {
+  if (served()) {
     watch_links();
     while (!daemon->answers.empty()) {
       job::InputBody body = std::move(daemon->answers.front());
@@ -183,7 +185,7 @@ void VirtualCell::State::deliver_laser() {
   };
   for (sim::LaserBlock& block : laser.advance(now, pose_at)) wire.push_back(std::move(block));
   while (!wire.empty() && wire.front().arrival <= now) {
-    if (daemon && daemon->cell.wants_laser())
+    if (served() && daemon->cell.wants_laser())
       feed(wire.front().arrival, job::LaserBytes{std::move(wire.front().bytes)});
     wire.pop_front();
   }
@@ -253,6 +255,8 @@ void VirtualCell::kill_daemon() {
   state_->daemon.reset();
   state_->note_armed();
 }
+
+void VirtualCell::stall_daemon(bool stalled) { state_->stalled = stalled; }
 
 void VirtualCell::start_daemon() { state_->begin(true); }
 

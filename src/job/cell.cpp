@@ -380,7 +380,8 @@ void Cell::settle_stop(const RobotReply& reply) {
     }
     return;
   }
-  const bool told_by_egm = status_.fault == FaultCode::EgmLost || status_.fault == FaultCode::RobotStopped;
+  const bool told_by_egm = status_.fault == FaultCode::EgmLost || status_.fault == FaultCode::EgmNotStarted ||
+                           status_.fault == FaultCode::RobotStopped;
   if (status_.state != State::Faulted || !told_by_egm || reply.text.empty()) return;
   // EGM only fell silent; the controller knows why.
   status_.fault_text += "; the controller's log: " + reply.text;

@@ -116,6 +116,14 @@ bool Controller::inject(const std::string& fault, double duration_s) {
   return true;
 }
 
+void Controller::bound_axis(std::size_t axis, double lower_rad, double upper_rad) {
+  ControllerState& s = *state_;
+  s.arm.lower.at(axis) = lower_rad;
+  s.arm.upper.at(axis) = upper_rad;
+  s.path.set_arm(s.arm);
+  s.egm.set_arm(s.arm);
+}
+
 std::vector<TimedFault> FaultSchedule::due(HostTime now, const Controller& controller) {
   const double t = seconds(now.ns);
   if (!scan_begin_s_ && controller.egm_guiding()) scan_begin_s_ = t;

@@ -72,6 +72,8 @@ class EgmChannel {
   EgmChannel(const kinematics::ArmModel& arm, double position_gain, double low_pass_hz, double cycle_s,
              EgmShape shape = {});
 
+  /// Joint ranges and speeds from now on.
+  void set_arm(const kinematics::ArmModel& arm) { arm_ = arm; }
   void reset();
   void get_id();
   void set_up(double comm_timeout_s);

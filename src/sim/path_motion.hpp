@@ -33,6 +33,8 @@ class PathMotion {
   /// limit), "motion.configuration" (ends in another configuration), "motion.singular" (a joint would have to
   /// jump).
   Status add(const Move& move);
+  /// Joint ranges and speeds for the moves to come.
+  void set_arm(const kinematics::ArmModel& arm) { arm_ = arm; }
   /// Forgets all moves; the reference stands still at `joints`.
   void reset(const kinematics::Joints& joints);
   /// One cycle. speed_ratio 0..1 of the programmed speed; hold ramps to rest on the path.

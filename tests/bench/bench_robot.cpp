@@ -1,46 +1,56 @@
 // The arm in figures: kinematics against the reference vectors and against itself, tracking of the simulated
 // controller by the shipped RAPID module, and the limits as properties of random motions.
-// usage: bench_robot [--json] [--plans N]     default 10000; with --plans the random motions alone
-#include <algorithm>
 #include <cstdlib>
+#include <cstring>
 
 #include "bench/robot/parts.hpp"
 
 namespace {
 
-/// The N of --plans N; `fallback` without it, -1 when it is no positive number.
-int plans_of(int argc, char** argv, int fallback) {
-  for (int i = 1; i < argc; ++i) {
-    if (std::string(argv[i]) != "--plans") continue;
-    const int count = i + 1 < argc ? std::atoi(argv[i + 1]) : 0;
-    return count > 0 ? count : -1;
-  }
-  return fallback;
+constexpr const char* kUsage =
+    "usage: bench_robot [--json] [--plans N]\n"
+    "  --plans N   the random motions alone, N of them (without it 10000, and all the rest)\n"
+    "exit codes: 0 every target met, 1 not all met, 2 usage\n";
+
+struct Options {
+  bool json = false;
+  int plans = 0;  ///< 0: not asked for
+};
+
+int refuse(const char* what) {
+  std::fprintf(stderr, "bench_robot: %s\n%s", what, kUsage);
+  return 2;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   using namespace weldcell;
+  Options options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--help" || word == "-h") return std::fputs(kUsage, stdout), 0;
+    if (word == "--json") {
+      options.json = true;
+    } else if (word == "--plans") {
+      options.plans = i + 1 < argc ? std::atoi(argv[++i]) : 0;
+      if (options.plans <= 0) return refuse("--plans needs a number above 0, e.g. --plans 10000");
+    } else {
+      return refuse(("what is '" + word + "'?").c_str());
+    }
+  }
   auto read = files::read_cell_file(WELDCELL_CONFIG "/cell-demo.yaml");
   if (const auto* faults = std::get_if<files::Faults>(&read)) {
     std::fprintf(stderr, "bench_robot: %s\n", files::text(*faults).c_str());
     return 2;
   }
   const auto& config = std::get<files::CellConfig>(read);
-  const bool asked =
-      std::any_of(argv, argv + argc, [](const char* a) { return std::string(a) == "--plans"; });
-  const int plans = plans_of(argc, argv, 10000);
-  if (plans < 0) {
-    std::fprintf(stderr, "bench_robot: --plans needs a number above 0, e.g. --plans 10000\n");
-    return 2;
-  }
   std::vector<bench::Row> rows;
-  if (!asked) {
+  if (options.plans == 0) {
     bench::against_references(rows);
     bench::against_itself(rows);
     bench::tracking(rows, config);
   }
-  bench::random_plans(rows, config.setup, plans);
-  return bench::finish("robot", rows, bench::wants_json(argc, argv));
+  bench::random_plans(rows, config.setup, options.plans > 0 ? options.plans : 10000);
+  return bench::finish("robot", rows, options.json);
 }

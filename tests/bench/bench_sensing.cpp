@@ -278,6 +278,7 @@ int main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--json") == 0) continue;
     const bool help = std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0;
+    if (!help) std::fprintf(stderr, "bench_sensing: what is '%s'?\n", argv[i]);
     std::fprintf(help ? stdout : stderr,
                  "usage: bench_sensing [--json]\nFigures of decoding, alignment and edge detection.\n");
     return help ? 0 : 2;

@@ -8,9 +8,12 @@
 
 #include <algorithm>
 #include <functional>
+#include <regex>
 #include <set>
+#include <sstream>
 
 #include "weldcell/app/virtual_cell.hpp"
+#include "weldcell/base/units.hpp"
 #include "weldcell/files/document.hpp"
 #include "weldcell/files/job_file.hpp"
 #include "weldcell/weld/resident.hpp"
@@ -30,7 +33,7 @@ constexpr double kSeamEnds_s = 15;  // within which a seam under way ends and th
 constexpr double kGiveUp_s = 900;
 
 /// What the PC's side suffers; the scene's faults are the controller's and the sensor's.
-enum class Loss { None, Daemon, PlcHeartbeat };
+enum class Loss { None, Daemon, Processor, PlcHeartbeat };
 
 struct Case {
   std::string name = {};
@@ -38,17 +41,20 @@ struct Case {
   FaultCode fault = FaultCode::None;
   std::string text = {};       ///< in the fault's text
   int event = 0;               ///< in the controller's log
-  State in = State::Scanning;  ///< where the loss of the PC's side comes, `after_s` after the state began
+  State in = State::Scanning;  ///< where loss and `befalls` come, `after_s` after the state began
   Loss loss = Loss::None;
   double after_s = 4, down_s = 3;
   std::string still_refused =
       {};  ///< what a resume says before the person did more than wait; "" = it goes on
   bool press_motors_on = false;
-  bool seam_left_out = false;  ///< a seam was cut: finished by hand
-  bool seam_finished = false;  ///< the seam under way is welded to its end, and none begins after it
+  bool seam_left_out = false;    ///< a seam was cut: finished by hand
+  std::size_t never_welded = 0;  ///< seams whose arc was struck and did not travel
+  bool seam_finished = false;    ///< the seam under way is welded to its end, and none begins after it
   State goes_on_at = State::PreparingScan;
   bool guidance = false;
+  std::function<void(VirtualCell&)> befalls = {};    ///< what happens to the controller
   std::function<void(VirtualCell&)> meanwhile = {};  ///< while the cell stands there
+  std::function<void(VirtualCell&)> mend = {};       ///< by a person, before the cell is armed again
 };
 
 std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.name; }
@@ -59,16 +65,52 @@ T must(std::variant<T, files::Faults> read) {
   return std::get<T>(std::move(read));
 }
 
+ports::HttpReply at_the_pendant(VirtualCell& cell, const std::string& method, const std::string& path,
+                                const std::string& body = "") {
+  constexpr int kPendant = 77;
+  ports::HttpRequest request;
+  request.method = method;
+  request.path = path;
+  request.body = body;
+  return cell.controller().handle_rws(request, kPendant);
+}
+
 /// Starts the program on the FlexPendant, as far as the controller lets it.
 void press_start(VirtualCell& cell) {
-  ports::HttpRequest request;
-  request.method = "POST";
-  request.path = "/rw/rapid/execution?action=start";
-  request.body =
-      "regain=continue&execmode=continue&cycle=once&condition=none&stopatbp=disabled&alltaskbytsp=false";
-  constexpr int kPendant = 77;
-  EXPECT_EQ(cell.controller().handle_rws(request, kPendant).status, 204);
+  const auto reply = at_the_pendant(
+      cell, "POST", "/rw/rapid/execution?action=start",
+      "regain=continue&execmode=continue&cycle=once&condition=none&stopatbp=disabled&alltaskbytsp=false");
+  EXPECT_EQ(reply.status, 204);
 }
+
+/// An axis (0..5) bounded in the controller's configuration to +-half_deg about where it stands.
+std::function<void(VirtualCell&)> bounded(std::size_t axis, double half_deg) {
+  return [=](VirtualCell& cell) {
+    const double at = cell.controller().joints()[axis];
+    cell.controller().bound_axis(axis, at - rad(half_deg), at + rad(half_deg));
+  };
+}
+std::function<void(VirtualCell&)> unbounded(std::size_t axis) {
+  return [=](VirtualCell& cell) { cell.controller().bound_axis(axis, rad(-180), rad(180)); };
+}
+
+/// A target of the weld module changed by hand on the FlexPendant, before the program starts.
+std::function<void(VirtualCell&)> edited(const std::string& from, const std::string& to) {
+  return [=](VirtualCell& cell) {
+    ports::HttpReply file;
+    for (int cycle = 0; cycle < 2500 && file.status != 200; ++cycle) {
+      cell.advance();
+      file = at_the_pendant(cell, "GET", "/fileservice/$HOME/WeldcellJob.mod");
+    }
+    const std::string changed = std::regex_replace(file.body, std::regex(from), to);
+    ASSERT_NE(changed, file.body) << "no " << from << " in\n" << file.body;
+    ASSERT_FALSE(cell.controller().program_running()) << "too late";
+    ASSERT_TRUE(cell.controller().load_module(changed).ok());
+  };
+}
+const std::string kTarget = R"((robtarget p01_002:=\[\[)[-0-9.]+(,))", kFarAway = "$019000$2";
+const std::string kConfiguration = R"((robtarget p02Approach:=\[\[[^\]]*\],\[[^\]]*\],\[[-0-9]+,)[-0-9]+(,))",
+                  kOther = "$1-3$2";
 
 class Recovery : public testing::TestWithParam<Case> {
  protected:
@@ -121,12 +163,20 @@ class Recovery : public testing::TestWithParam<Case> {
   }
 
   void suffer() {
-    if (c_.loss == Loss::None) return;
+    if (c_.loss == Loss::None && !c_.befalls) return;
     ASSERT_TRUE(run_until([&] { return state_is(c_.in); })) << story();
-    if (c_.in == State::Welding) {
+    if (c_.in == State::Welding && !c_.befalls) {
       ASSERT_TRUE(run_until([&] { return cell_->controller().arc_on(); })) << story();
     }
     run_for(c_.after_s);
+    if (c_.befalls) c_.befalls(*cell_);
+    if (c_.loss == Loss::None) return;
+    if (c_.loss == Loss::Processor) {
+      cell_->stall_daemon(true);
+      run_for(c_.down_s);
+      cell_->stall_daemon(false);
+      return;
+    }
     if (c_.loss == Loss::PlcHeartbeat) {
       cell_->set_plc_heartbeat(false);
       return;
@@ -190,6 +240,7 @@ class Recovery : public testing::TestWithParam<Case> {
     }
     // Faults that pass by themselves have passed after this.
     run_for(60);
+    if (c_.mend) c_.mend(*cell_);
     if (c_.press_motors_on) cell_->controller().inject("motors_on");
     run_for(1);
   }
@@ -226,7 +277,7 @@ class Recovery : public testing::TestWithParam<Case> {
         EXPECT_LT(seam.lateral_error_mm, 0.5) << seam.seam;
       }
     }
-    EXPECT_EQ(welded.size(), seams) << story();
+    EXPECT_EQ(welded.size() + c_.never_welded, seams) << story();
     for (const std::string& seam : welded) EXPECT_EQ(welded.count(seam), 1U) << seam << " was welded twice";
   }
 
@@ -278,6 +329,16 @@ const std::vector<Case> kCases{
      .fault = FaultCode::EgmLost,
      .text = "41822",
      .event = 41822},
+    {.name = "NetworkCutInWeld",
+     .faults = {"egm_silence@weld+1.5:50", "rws_silence@weld+1.5:50"},
+     .fault = FaultCode::RobotCommand,
+     .event = 80001,
+     .seam_finished = true},
+    {.name = "CommTimeoutInScan",
+     .fault = FaultCode::EgmLost,
+     .text = "41822",
+     .event = 41822,
+     .loss = Loss::Processor},
     {.name = "EgmNeverStarts", .faults = {"egm_silence@0:60"}, .fault = FaultCode::EgmNotStarted},
     {.name = "RwsLostInScan",
      .faults = {"rws_silence@scan+5:100"},
@@ -358,6 +419,12 @@ const std::vector<Case> kCases{
      .event = 10013,
      .still_refused = "emergency stop",
      .press_motors_on = true},
+    {.name = "GuardStopInScan",
+     .faults = {"guardstop@scan+5:40"},
+     .fault = FaultCode::EgmLost,
+     .text = "10012",
+     .event = 10012,
+     .still_refused = "guard"},
     {.name = "GuardStopInWeld",
      .faults = {"guardstop@weld+3:40"},
      .fault = FaultCode::ProgramStopped,
@@ -412,7 +479,47 @@ const std::vector<Case> kCases{
      .fault = FaultCode::ProgramStopped,
      .event = 10002,
      .seam_left_out = true},
+    {.name = "OutOfReachInAMove",
+     .fault = FaultCode::RobotCommand,
+     .text = "50050",
+     .event = 50050,
+     .in = State::Ready,
+     .after_s = 0,
+     .goes_on_at = State::GuideMoving,
+     .guidance = true,
+     .befalls = bounded(2, 0.5),
+     .mend = unbounded(2)},
+    {.name = "OutOfReachBeforeScan",
+     .fault = FaultCode::EgmNotStarted,
+     .text = "50050",
+     .event = 50050,
+     .in = State::Ready,
+     .after_s = 0,
+     .befalls = bounded(2, 0.5),
+     .mend = unbounded(2)},
+    {.name = "OutOfReachInWeld",
+     .fault = FaultCode::ProgramStopped,
+     .text = "50050",
+     .event = 50050,
+     .in = State::Welding,
+     .after_s = 0,
+     .seam_left_out = true,
+     .never_welded = 1,
+     .befalls = edited(kTarget, kFarAway)},
+    {.name = "WrongConfigurationInWeld",
+     .fault = FaultCode::ProgramStopped,
+     .text = "50080",
+     .event = 50080,
+     .in = State::Welding,
+     .after_s = 0,
+     .befalls = edited(kConfiguration, kOther)},
     {.name = "JointRangeLeftInScan",
+     .fault = FaultCode::EgmLost,
+     .text = "50027",
+     .event = 50027,
+     .befalls = bounded(0, 0.5),
+     .mend = unbounded(0)},
+    {.name = "SingularityInScan",
      .faults = {"singularity@scan+5"},
      .fault = FaultCode::EgmLost,
      .text = "50027",
@@ -441,6 +548,21 @@ const std::vector<Case> kCases{
      .event = 50204,
      .seam_left_out = true},
 };
+
+TEST(RecoveryTable, NamesEveryCaseAndNoOther) {
+  const std::string page = must(files::read_text_file(std::string(WELDCELL_CONFIG) + "/../docs/RECOVERY.md"));
+  std::set<std::string> named, there;
+  const std::regex name("`([A-Z][A-Za-z]+)`");
+  for (std::istringstream lines(page); !lines.eof();) {
+    std::string line;
+    std::getline(lines, line);
+    if (!line.starts_with("| ")) continue;
+    line.erase(0, line.rfind('|', line.size() - 2));  // what shows it
+    for (std::sregex_iterator m(line.begin(), line.end(), name), end; m != end; ++m) named.insert((*m)[1]);
+  }
+  for (const Case& c : kCases) there.insert(c.name);
+  EXPECT_THAT(named, testing::ContainerEq(there));
+}
 
 INSTANTIATE_TEST_SUITE_P(Matrix, Recovery, testing::ValuesIn(kCases),
                          [](const auto& tested) { return tested.param.name; });

@@ -64,6 +64,8 @@ class VirtualCell {
   void kill_daemon();
   /// The job is found interrupted.
   void start_daemon();
+  /// A daemon that gets no processor: it neither hears nor speaks, and knows nothing of it.
+  void stall_daemon(bool stalled);
   void set_plc_heartbeat(bool up);
 
   sim::Controller& controller();

@@ -78,6 +78,10 @@ class Controller {
   /// next move), "restart", "egm_silence", "rws_503", "rws_silence". Those that last end after duration_s (0:
   /// never; a restart takes 5 s). False when the kind is unknown.
   bool inject(const std::string& fault, double duration_s = 0);
+  /// Bounds an axis (0..5) as the controller's own configuration does, rad, about where it stands: targets
+  /// and references beyond are refused from now on by whatever meets them (50027 in EGM, 50050 or 50080 in
+  /// RAPID).
+  void bound_axis(std::size_t axis, double lower_rad, double upper_rad);
 
   /// Loads a module as a disk restart would: no mastership needed. Error "rapid.*".
   Status load_module(const std::string& text);
