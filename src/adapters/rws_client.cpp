@@ -61,7 +61,21 @@ Status MastershipLease::release() {
   return std::exchange(client_, nullptr)->release_mastership(domain_);
 }
 
+Status RwsClient::end_former_session() {
+  const RwsAsk ask = dialect_.release_mastership(MastershipDomain::Rapid);
+  const auto released = transport_->exchange({ask.method, ask.path, ask.body, ask.content_type, ask.accept});
+  if (!released.ok()) return released.error();
+  // Any other refusal will do: that session held nothing, or the controller knows it no longer.
+  if (released->status == 503) return wire::rws_refusal(released->status, released->body, ask.path);
+  if (auto ended = end_former_(); !ended.ok()) return ended;
+  end_former_ = nullptr;
+  return Done{};
+}
+
 Result<ports::HttpReply> RwsClient::checked(RwsAsk ask) {
+  if (end_former_) {
+    if (auto ended = end_former_session(); !ended.ok()) return ended.error();
+  }
   const std::string name = ask.method + " " + ask.path;
   const bool hal = ask.accept.find("hal+json") != std::string::npos;
   ports::HttpRequest request{ask.method, ask.path, ask.body, ask.content_type, ask.accept};

@@ -20,6 +20,7 @@
 #include <utility>
 
 #include "rws_session.hpp"
+#include "rws_session_file.hpp"
 #include "weldcell/adapters/host_clock.hpp"
 #include "weldcell/wire/rws_pace.hpp"
 
@@ -51,17 +52,23 @@ struct RwsHttp::State {
         digest(access.user, access.password),
         basic(access.user, access.password),
         rate(access.least_interval, access.burst),
-        place("rws " + access.host + ":" + std::to_string(access.port)) {}
+        place("rws " + access.host + ":" + std::to_string(access.port)),
+        controller(access.host + ":" + std::to_string(access.port) + (two() ? " 2" : " 1")) {
+    if (!access.session_file.empty()) saved = cookies = read_rws_session(access.session_file, controller);
+    former = !cookies.empty();
+  }
 
   RwsAccess access;
   Poco::Net::HTTPDigestCredentials digest;
   Poco::Net::HTTPBasicCredentials basic;
   wire::RwsPace rate;
-  std::string place;
+  std::string place, controller;
   std::unique_ptr<Poco::Net::HTTPClientSession> session;
   bool has_nonce = false;
   bool fresh_connection = true;
-  std::map<std::string, std::string> cookies;
+  RwsCookies cookies, saved;  ///< in use; in session_file
+  bool former = false, session_fault_told = false;
+  std::optional<Error> session_fault;
   RwsHttpCounters counters;
 
   Error fault(const char* code, const std::string& what, const char* mend) const {
@@ -72,6 +79,7 @@ struct RwsHttp::State {
   std::string cookie_line() const;
   ports::HttpReply send_once(const ports::HttpRequest& request, HTTPResponse& response, HTTPRequest& wire);
   void keep_cookies(const HTTPResponse& response);
+  void keep_session();
   std::optional<Error> answer_challenge(HTTPRequest& wire, const HTTPResponse& response);
   Result<ports::HttpReply> exchange(const ports::HttpRequest& request);
 };
@@ -92,6 +100,19 @@ void RwsHttp::State::keep_cookies(const HTTPResponse& response) {
   for (auto header = response.find("Set-Cookie");
        header != response.end() && Poco::icompare(header->first, "Set-Cookie") == 0; ++header) {
     if (auto cookie = parse_cookie(header->second)) cookies[cookie->first] = cookie->second;
+  }
+  keep_session();
+}
+
+void RwsHttp::State::keep_session() {
+  // Durable before the next request: only a session that is known afterwards may take mastership.
+  if (access.session_file.empty() || cookies == saved) return;
+  const Status written = write_rws_session(access.session_file, controller, cookies);
+  if (written.ok()) {
+    saved = cookies;
+    session_fault_told = false;
+  } else if (!std::exchange(session_fault_told, true)) {
+    session_fault = written.error();
   }
 }
 
@@ -202,7 +223,7 @@ Result<ports::HttpReply> RwsHttp::State::exchange(const ports::HttpRequest& requ
 }
 
 RwsHttp::RwsHttp(RwsAccess access) : state_(std::make_unique<State>(std::move(access))) {}
-RwsHttp::~RwsHttp() { logout(); }
+RwsHttp::~RwsHttp() { static_cast<void>(logout()); }
 
 Result<ports::HttpReply> RwsHttp::exchange(const ports::HttpRequest& request) {
   return state_->exchange(request);
@@ -216,15 +237,27 @@ void RwsHttp::take_turn() {
   ++state_->counters.requests;
 }
 
-void RwsHttp::logout() {
+bool RwsHttp::has_former_session() const { return state_->former; }
+std::optional<Error> RwsHttp::take_session_fault() {
+  return std::exchange(state_->session_fault, std::nullopt);
+}
+
+Status RwsHttp::logout() {
   State& s = *state_;
-  if (s.cookies.empty()) return;
+  if (s.cookies.empty()) return Done{};
   const Nanoseconds usual = std::exchange(s.access.timeout, std::min(s.access.timeout, kLogoutTimeout));
   s.session.reset();
-  static_cast<void>(s.exchange({"GET", "/logout", "", "", s.two() ? "application/xhtml+xml;v=2.0" : ""}));
+  const auto reply = s.exchange({"GET", "/logout", "", "", s.two() ? "application/xhtml+xml;v=2.0" : ""});
   s.access.timeout = usual;
-  s.cookies.clear();
   s.session.reset();
+  if (!reply.ok()) return reply.error();
+  if (reply->status == HTTPResponse::HTTP_SERVICE_UNAVAILABLE)
+    return s.fault("http.overloaded", "GET /logout was answered 503", "wait; it is tried again");
+  s.cookies.clear();
+  s.saved.clear();
+  s.former = false;
+  if (!s.access.session_file.empty()) remove_rws_session(s.access.session_file);
+  return Done{};
 }
 
 }  // namespace weldcell::adapters

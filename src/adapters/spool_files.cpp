@@ -82,8 +82,8 @@ int copy_file_durably(const fs::path& from, const fs::path& to) noexcept {
   return ::fsync(out.get()) == 0 ? 0 : errno;
 }
 
-int write_text_durably(const fs::path& path, std::string_view text) noexcept {
-  const Fd out(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
+int write_text_durably(const fs::path& path, std::string_view text, unsigned mode) noexcept {
+  const Fd out(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
   if (!out.valid() || !write_all(out.get(), text.data(), text.size()) || ::fsync(out.get()) != 0)
     return errno;
   return 0;

@@ -1,5 +1,5 @@
 // File steps that the spool is made of: refusing renames, durable copies, look-ups that follow no link.
-// Private to the spool.
+// Private.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,8 @@ void sync_folder(const std::filesystem::path& folder) noexcept;
 /// Durable copy of a plain file that follows no link and overwrites nothing. 0 or an errno.
 int copy_file_durably(const std::filesystem::path& from, const std::filesystem::path& to) noexcept;
 /// Durable new text file. 0 or an errno.
-int write_text_durably(const std::filesystem::path& path, std::string_view text) noexcept;
+int write_text_durably(const std::filesystem::path& path, std::string_view text,
+                       unsigned mode = 0640) noexcept;
 /// At most `limit` bytes of a plain file; empty when it cannot be read. Follows no link.
 std::string read_text(const std::filesystem::path& path, std::size_t limit);
 

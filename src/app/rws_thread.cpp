@@ -24,6 +24,7 @@ adapters::RwsAccess access_of(const files::CellConfig& config, const std::string
   access.port = config.rws.port;
   access.certificate_sha256 = config.rws_certificate_sha256;
   access.user = config.rws_user;
+  access.session_file = config.state_dir + "/rws-session";
   access.password = password;
   if (config.rws_generation == files::RwsGenerationChoice::Two) access.generation = wire::RwsGeneration::Two;
   return access;
@@ -81,6 +82,11 @@ void run_rws(Wiring& wiring, const std::string& password, const ResidentModules&
   access.generation = *generation;
   adapters::RwsHttp http(access);
   adapters::RwsClient rws(http, *generation);
+  if (http.has_former_session()) {
+    spdlog::info(
+        "robot controller: the session of an earlier run is ended first, with the mastership it holds");
+    rws.end_former_session_first([&http] { return http.logout(); });
+  }
   ControllerWatch watch(rws, http);
   RobotRunner runner(rws, wiring.config.rws_task,
                      *generation == wire::RwsGeneration::Two ? resident.modx : resident.mod, &watch.view());
@@ -89,6 +95,7 @@ void run_rws(Wiring& wiring, const std::string& password, const ResidentModules&
     if (const auto reply = runner.step(adapters::now())) wiring.inbox.push({*reply, nullptr, nullptr});
     watch.step(adapters::now());
     report(wiring, watch, link);
+    if (const auto fault = http.take_session_fault()) spdlog::warn("robot controller: {}", fault->text());
     wiring.beat(ThreadName::Rws);
   };
   while (!stopping(wiring)) {

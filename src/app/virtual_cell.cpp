@@ -17,29 +17,43 @@ namespace {
 
 constexpr std::uint64_t kTickCycles = 5, kRobotCycles = 12, kPersonCycles = 50, kLookCycles = 250;
 
-/// The simulated controller's RWS without a socket.
+/// The simulated controller's RWS without a socket. `session` is what the cookies name, and lies on the disk.
 class DirectTransport final : public ports::HttpTransport {
  public:
-  explicit DirectTransport(sim::Controller& controller) : controller_(&controller) {}
+  DirectTransport(sim::Controller& controller, int& session) : controller_(&controller), session_(&session) {}
   Result<ports::HttpReply> exchange(const ports::HttpRequest& request) override {
     if (controller_->rws_silent())
       return Error{"http.connection", request.path, "the connection was refused", "check the network"};
-    return controller_->handle_rws(request);
+    return controller_->handle_rws(request, *session_);
+  }
+  Status logout() {
+    if (controller_->rws_silent())
+      return Error{"http.connection", "/logout", "the connection was refused", "check the network"};
+    controller_->end_rws_session((*session_)++);
+    return Done{};
   }
 
  private:
   sim::Controller* controller_;
+  int* session_;
 };
 
 /// What ends when the process ends.
 struct Daemon {
-  Daemon(const files::CellConfig& config, const VirtualJob& job, sim::Controller& controller)
+  Daemon(const files::CellConfig& config, const VirtualJob& job, sim::Controller& controller,
+         int& rws_session)
       : cell(config.setup, config.laser_format, job.plc),
         session(config.setup),
-        transport(controller),
+        transport(controller, rws_session),
         rws(transport,
             controller.rws_generation() == 2 ? wire::RwsGeneration::Two : wire::RwsGeneration::One),
-        runner(rws, config.rws_task, job.resident_module) {}
+        runner(rws, config.rws_task, job.resident_module) {
+    if (rws_session == 0) {
+      rws_session = 1;
+    } else {
+      rws.end_former_session_first([this] { return transport.logout(); });
+    }
+  }
 
   job::Cell cell;
   robot::EgmSession session;
@@ -84,6 +98,7 @@ struct VirtualCell::State {
   sim::FaultSchedule faults;
   std::unique_ptr<Daemon> daemon;
   job::SaveState saved;  ///< what a disk would hold
+  int rws_session = 0;   ///< as saved
 
   HostTime now;
   std::uint64_t cycles = 0, jitter = 1;
@@ -95,7 +110,7 @@ struct VirtualCell::State {
 };
 
 void VirtualCell::State::begin(bool interrupted) {
-  daemon = std::make_unique<Daemon>(config, job, controller);
+  daemon = std::make_unique<Daemon>(config, job, controller, rws_session);
   laser_up = laser.connected();
   rws_up = !controller.rws_silent();
   if (laser_up) feed(job::LinkChange{job::Link::Laser, true, {}});
@@ -251,7 +266,9 @@ void VirtualCell::act_as_person() {
   }
 }
 
-void VirtualCell::kill_daemon() {
+void VirtualCell::kill_daemon(bool holding_mastership) {
+  if (holding_mastership)
+    static_cast<void>(state_->daemon->rws.request_mastership(wire::MastershipDomain::Rapid));
   state_->daemon.reset();
   state_->note_armed();
 }

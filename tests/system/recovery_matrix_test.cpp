@@ -47,6 +47,7 @@ struct Case {
   std::string still_refused =
       {};  ///< what a resume says before the person did more than wait; "" = it goes on
   bool press_motors_on = false;
+  bool mastership_held = false;  ///< by the session of the killed daemon
   bool seam_left_out = false;    ///< a seam was cut: finished by hand
   std::size_t never_welded = 0;  ///< seams whose arc was struck and did not travel
   bool seam_finished = false;    ///< the seam under way is welded to its end, and none begins after it
@@ -111,6 +112,13 @@ std::function<void(VirtualCell&)> edited(const std::string& from, const std::str
 const std::string kTarget = R"((robtarget p01_002:=\[\[)[-0-9.]+(,))", kFarAway = "$019000$2";
 const std::string kConfiguration = R"((robtarget p02Approach:=\[\[[^\]]*\],\[[^\]]*\],\[[-0-9]+,)[-0-9]+(,))",
                   kOther = "$1-3$2";
+
+/// Another client that asks for mastership is refused.
+bool mastership_taken(VirtualCell& cell) {
+  if (at_the_pendant(cell, "POST", "/rw/mastership/rapid?action=request").status == 403) return true;
+  at_the_pendant(cell, "POST", "/rw/mastership/rapid?action=release");
+  return false;
+}
 
 class Recovery : public testing::TestWithParam<Case> {
  protected:
@@ -182,7 +190,8 @@ class Recovery : public testing::TestWithParam<Case> {
       return;
     }
     note_loss();
-    cell_->kill_daemon();
+    cell_->kill_daemon(c_.mastership_held);
+    EXPECT_EQ(mastership_taken(*cell_), c_.mastership_held);
     run_for(c_.down_s);
     cell_->start_daemon();
   }
@@ -377,6 +386,14 @@ const std::vector<Case> kCases{
      .loss = Loss::Daemon,
      .after_s = 1,
      .down_s = 1,
+     .seam_left_out = true},
+    {.name = "PcCrashInWeldWithMastershipHeld",
+     .event = 10125,
+     .in = State::Welding,
+     .loss = Loss::Daemon,
+     .after_s = 1,
+     .down_s = 1,
+     .mastership_held = true,
      .seam_left_out = true},
     {.name = "RwsLostInWeld",
      .faults = {"rws_silence@weld+1.5:50"},

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -77,6 +78,10 @@ class RwsClient {
       : transport_(&transport), dialect_(generation) {}
   RwsGeneration generation() const { return dialect_.generation(); }
   const wire::RwsDialect& dialect() const { return dialect_; }
+  /// The carrier still speaks for the session of an earlier process. Before the first request the mastership
+  /// that it may hold is released and `logout` called, which ends it; both again, and the request failing
+  /// with their error, until the controller has answered.
+  void end_former_session_first(std::function<Status()> logout) { end_former_ = std::move(logout); }
 
   Result<SystemInfo> system();
   Result<ControllerState> controller_state();
@@ -140,12 +145,14 @@ class RwsClient {
   Status unsubscribe(std::string_view group);
 
  private:
+  Status end_former_session();
   Result<ports::HttpReply> checked(wire::RwsAsk ask);
   Result<std::string> field(wire::RwsAsk ask, std::string_view type, std::string_view name);
   Status command(wire::RwsAsk ask);
 
   ports::HttpTransport* transport_;
   wire::RwsDialect dialect_;
+  std::function<Status()> end_former_;
 };
 
 }  // namespace weldcell::adapters

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "weldcell/base/time.hpp"
@@ -19,7 +20,10 @@ struct RwsAccess {
   std::string
       certificate_sha256;  ///< generation 2: 64 lower-case hexadecimal digits; nothing is sent to another
   std::string user = "Default User";
-  std::string password;               ///< appears in no message of this adapter
+  std::string password;  ///< appears in no message of this adapter
+  /// Where the session's cookies lie from its login to its logout, so that a killed process's session can be
+  /// ended by the next one; "" = nowhere. They are secrets: mode 0600, in no message.
+  std::string session_file;
   Nanoseconds timeout = 5 * kSecond;  ///< of connecting, and of each send and receive
   /// Between starts of requests, and how many may start at once: the controller allows fewer than 20 a
   /// second.
@@ -50,9 +54,13 @@ class RwsHttp final : public ports::HttpTransport {
   RwsHttp& operator=(const RwsHttp&) = delete;
 
   Result<ports::HttpReply> exchange(const ports::HttpRequest& request) override;
+  /// An earlier process left its session: the cookies of session_file are in use until logout().
+  bool has_former_session() const;
   /// Ends the session; mastership held by it is dropped by the controller. The next exchange begins a new
-  /// one.
-  void logout();
+  /// one. Errors as exchange(), and "http.overloaded" (503): the session may stand still, and its file stays.
+  Status logout();
+  /// Why the session's cookies could not be kept, once each time that it begins.
+  std::optional<Error> take_session_fault();
   const RwsHttpCounters& counters() const;
   const RwsAccess& access() const;
   /// The session's cookies as a Cookie header, "" before the first exchange.

@@ -60,8 +60,9 @@ class VirtualCell {
   std::string order(wire::PlcCommand command);
   /// Confirms and starts as a job needs it in its present state; arms only when the job waits for its start.
   void act_as_person();
-  /// From one moment to the next, as by power loss: what was durable stays.
-  void kill_daemon();
+  /// From one moment to the next, as by power loss: what was durable stays. With `holding_mastership` in the
+  /// moment of a write, so that the controller keeps the mastership for the dead session.
+  void kill_daemon(bool holding_mastership = false);
   /// The job is found interrupted.
   void start_daemon();
   /// A daemon that gets no processor: it neither hears nor speaks, and knows nothing of it.

@@ -13,6 +13,9 @@
 
 #include <unistd.h>
 
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <set>
@@ -290,6 +293,99 @@ TEST_F(RwsHttpTest, LogoutFreesTheSession) {
   }
   EXPECT_EQ(controller_.log.back(), "GET /logout 200");
   EXPECT_EQ(controller_.cookies.back(), "-http-session-=4::http.session::abc; ABBCX=1");
+}
+
+class RwsSessionFileTest : public RwsHttpTest {
+ protected:
+  void SetUp() override {
+    RwsHttpTest::SetUp();
+    std::string pattern = (std::filesystem::temp_directory_path() / "rws-session-XXXXXX").string();
+    folder_ = ::mkdtemp(pattern.data());
+    kept_ = access();
+    kept_.session_file = (folder_ / "rws-session").string();
+  }
+  void TearDown() override {
+    std::filesystem::remove_all(folder_);
+    RwsHttpTest::TearDown();
+  }
+  std::string text() const {
+    std::ifstream in(kept_.session_file);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void write(const std::string& what, unsigned mode = 0600) {
+    std::ofstream(kept_.session_file, std::ios::trunc) << what;
+    std::filesystem::permissions(kept_.session_file, std::filesystem::perms(mode));
+  }
+  std::string sound() const {
+    return "weldcell rws session 1\ncontroller 127.0.0.1:" + std::to_string(server_->port()) + " 1\na=b\n";
+  }
+  std::filesystem::path folder_;
+  RwsAccess kept_;
+};
+
+TEST_F(RwsSessionFileTest, LiesThereFromLoginToLogoutForNobodyElse) {
+  RwsHttp http(kept_);
+  EXPECT_FALSE(http.has_former_session());
+  ASSERT_TRUE(http.exchange({"GET", "/rw/system?json=1", "", ""}).ok());
+  EXPECT_NE(text().find("-http-session-=4::http.session::abc\n"), std::string::npos) << text();
+  EXPECT_EQ(text().find(kPassword), std::string::npos);
+  EXPECT_EQ(std::filesystem::status(kept_.session_file).permissions(), std::filesystem::perms(0600));
+  ASSERT_TRUE(http.exchange({"GET", "/rw/system?json=1", "", ""}).ok());
+  EXPECT_NE(text().find("ABBCX=2\n"), std::string::npos) << "the newest of each: " << text();
+  RwsHttp next(kept_);
+  ++controller_.nonce;  // another client counts its uses of a nonce anew
+  EXPECT_TRUE(next.has_former_session());
+  EXPECT_EQ(next.cookie_header(), http.cookie_header());
+  EXPECT_TRUE(next.logout().ok());
+  EXPECT_EQ(controller_.log.back(), "GET /logout 200");
+  EXPECT_FALSE(next.has_former_session());
+  EXPECT_FALSE(std::filesystem::exists(kept_.session_file));
+}
+
+TEST_F(RwsSessionFileTest, IsKeptWhereNobodyAnswersTheLogout) {
+  write(sound());
+  controller_.answer_status = 503;
+  kept_.overload_pause = kMillisecond;
+  EXPECT_EQ(RwsHttp(kept_).logout().error().code, "http.overloaded");
+  EXPECT_TRUE(std::filesystem::exists(kept_.session_file));
+  server_->stopAll(true);
+  server_ = nullptr;
+  EXPECT_FALSE(RwsHttp(kept_).logout().ok());
+  EXPECT_TRUE(RwsHttp(kept_).has_former_session());
+  RwsHttpTest::SetUp();
+}
+
+TEST_F(RwsSessionFileTest, AnythingElseThanItsOwnIsNotSent) {
+  write(sound());
+  EXPECT_TRUE(RwsHttp(kept_).has_former_session()) << "what the others differ from";
+  controller_.log.clear();
+  const std::string port = std::to_string(server_->port());
+  for (const std::string& other :
+       {std::string(), std::string("weldcell rws session 2\ncontroller 127.0.0.1:" + port + " 1\na=b\n"),
+        std::string("weldcell rws session 1\ncontroller 127.0.0.2:" + port + " 1\na=b\n"),
+        std::string("weldcell rws session 1\ncontroller 127.0.0.1:" + port + " 2\na=b\n"),
+        sound() + "no equals\n", sound() + "a=b\rEvil: header\n", sound() + "=b\n"}) {
+    write(other);
+    EXPECT_FALSE(RwsHttp(kept_).has_former_session()) << other;
+  }
+  write(sound(), 0640);
+  EXPECT_FALSE(RwsHttp(kept_).has_former_session()) << "a group may read it";
+  write(sound());
+  std::filesystem::rename(kept_.session_file, folder_ / "elsewhere");
+  std::filesystem::create_symlink(folder_ / "elsewhere", kept_.session_file);
+  EXPECT_FALSE(RwsHttp(kept_).has_former_session()) << "a link";
+  EXPECT_TRUE(controller_.log.empty()) << "nothing was sent";
+}
+
+TEST_F(RwsSessionFileTest, AFolderThatCannotBeWrittenIsToldOnce) {
+  kept_.session_file = (folder_ / "missing/rws-session").string();
+  RwsHttp http(kept_);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(http.exchange({"GET", "/rw/system?json=1", "", ""}).ok());
+  const auto fault = http.take_session_fault();
+  ASSERT_TRUE(fault);
+  EXPECT_EQ(fault->code, "rws.session_file");
+  EXPECT_EQ(fault->text().find("abc"), std::string::npos) << "no cookie in a message";
+  EXPECT_FALSE(http.take_session_fault());
 }
 
 TEST_F(RwsHttpTest, NobodyThereIsUnreachable) {

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
 #include <mutex>
 #include <thread>
 
@@ -122,7 +124,7 @@ TEST_P(RobotLink, RunsAProgramThroughOneInterface) {
   ASSERT_TRUE(rws.joints_deg().ok());
   EXPECT_EQ(http.counters().overloads, 0u) << "its pace stays below the controller's limit";
   EXPECT_EQ(site.server->sessions(), 1u) << "one session for all";
-  http.logout();
+  EXPECT_TRUE(http.logout().ok());
   EXPECT_EQ(site.server->sessions(), 0u);
 }
 
@@ -137,6 +139,65 @@ TEST_P(RobotLink, SaysThatAnotherHoldsTheMastership) {
   EXPECT_EQ(held.error().code, "rws.held");
   EXPECT_NE(held.error().what.find("held by someone else"), std::string::npos) << held.error().text();
   EXPECT_NE(held.error().what.find("-1073445862"), std::string::npos) << held.error().text();
+}
+
+struct SessionFile {
+  SessionFile() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "rws-session-XXXXXX").string();
+    folder = ::mkdtemp(pattern.data());
+  }
+  ~SessionFile() { std::filesystem::remove_all(folder); }
+  std::string at(const char* name) const { return (folder / name).string(); }
+  std::filesystem::path folder;
+};
+
+TEST_P(RobotLink, TheMastershipOfAKilledProcessIsGivenBackBeforeAnythingElse) {
+  Site site(GetParam());
+  SessionFile files;
+  adapters::RwsAccess access = site.access();
+  access.session_file = files.at("killed");
+  adapters::RwsHttp killed_http(access);
+  adapters::RwsClient killed(killed_http, access.generation);
+  ASSERT_TRUE(killed.controller_state().ok());
+  ASSERT_TRUE(killed.request_mastership(MastershipDomain::Rapid).ok());
+  // What the disk holds at the kill; the killed one's own end comes too late to help.
+  std::filesystem::copy_file(access.session_file, files.at("kept"));
+  std::filesystem::permissions(files.at("kept"), std::filesystem::perms(0600));
+  access.session_file = files.at("kept");
+  adapters::RwsHttp http(access);
+  ASSERT_TRUE(http.has_former_session());
+  adapters::RwsClient rws(http, access.generation);
+  rws.end_former_session_first([&http] { return http.logout(); });
+  site.inject("rws_silence", 0.4);
+  EXPECT_FALSE(rws.controller_state().ok()) << "not answered: it is tried again";
+  EXPECT_TRUE(std::filesystem::exists(access.session_file));
+  site.step(120);
+  const auto lease = rws.lease(MastershipDomain::Rapid);
+  ASSERT_TRUE(lease.ok()) << lease.error().text();
+  EXPECT_FALSE(http.has_former_session());
+  EXPECT_EQ(site.server->sessions(), 1u) << "the killed one's session was ended";
+  EXPECT_NE(adapters::RwsHttp(access).cookie_header(), killed_http.cookie_header());
+}
+
+TEST_P(RobotLink, ASessionThatTheControllerKnowsNoLongerIsFollowedByALogin) {
+  Site site(GetParam());
+  SessionFile files;
+  adapters::RwsAccess access = site.access();
+  access.session_file = files.at("kept");
+  {
+    adapters::RwsHttp killed(access);
+    ASSERT_TRUE(adapters::RwsClient(killed, access.generation).controller_state().ok());
+    std::filesystem::copy_file(access.session_file, files.at("copy"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(access.session_file)) << "logged out: nothing is kept";
+  std::filesystem::rename(files.at("copy"), access.session_file);
+  adapters::RwsHttp http(access);
+  ASSERT_TRUE(http.has_former_session());
+  adapters::RwsClient rws(http, access.generation);
+  rws.end_former_session_first([&http] { return http.logout(); });
+  ASSERT_TRUE(rws.lease(MastershipDomain::Rapid).ok());
+  EXPECT_EQ(site.server->sessions(), 1u);
+  EXPECT_EQ(http.counters().overloads, 0u);
 }
 
 TEST(RobotLinkTwo, NothingGoesToAnotherCertificate) {
