@@ -15,6 +15,7 @@
 #include "weldcell/base/units.hpp"
 #include "weldcell/files/edge_file.hpp"
 #include "weldcell/files/workpiece_file.hpp"
+#include "weldcell/localize/height.hpp"
 #include "weldcell/localize/localizer.hpp"
 
 namespace weldcell::app {
@@ -92,6 +93,14 @@ void print_words(const Job& job, const nlohmann::json& result, const Localizatio
   std::printf("  points    %d of %d on the part, mean error %.2f mm\n", found.inliers, found.points,
               found.mean_error_mm);
   if (found.latency_s) std::printf("  latency   %.2f ms\n", 1e3 * *found.latency_s);
+  for (const char* name : {"top", "table"}) {
+    const auto& plane = result[name];
+    if (plane.is_null()) continue;
+    std::printf("  %-9s z %.2f mm, roll %.3f deg, pitch %.3f deg (1 sigma %.2f mm, %.3f deg, %.3f deg)\n",
+                name, plane["z_mm"].get<double>(), plane["roll_deg"].get<double>(),
+                plane["pitch_deg"].get<double>(), plane["z_sigma_mm"].get<double>(),
+                plane["roll_sigma_deg"].get<double>(), plane["pitch_sigma_deg"].get<double>());
+  }
   for (const localize::MemberPose& m : found.members) {
     std::printf("  member    %-12s %+.2f mm, %+.2f mm, %+.3f deg (%.2f mm, %d points)\n", m.name.c_str(),
                 m.dx_mm, m.dy_mm, deg(m.dtheta_rad), m.sigma_mm, m.points);
@@ -107,14 +116,14 @@ void print_words(const Job& job, const nlohmann::json& result, const Localizatio
 int run_one(const Job& job, const std::string& edges_path, const std::string& path_path,
             const std::string& file) {
   std::string text;
-  std::vector<EdgePoint> edges;
+  files::EdgeSet seen;
   std::vector<PathPiece> path;
-  if (!read_text(edges_path, &text) || !kept(files::parse_edges(text, edges_path), &edges)) return 2;
+  if (!read_text(edges_path, &text) || !kept(files::parse_edges(text, edges_path), &seen)) return 2;
   if (!path_path.empty()) {
     if (!read_text(path_path, &text) || !kept(files::parse_path(text, path_path), &path)) return 2;
   }
   const auto start = std::chrono::steady_clock::now();
-  const Localization found = job.localizer.localize(edges, path, job.options);
+  const Localization found = job.localizer.localize(seen.edges, path, job.options);
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
   std::vector<weld::WeldCertificate> certificates;
   // Without a pose and its covariance there is nothing to certify a weld by.
@@ -123,6 +132,10 @@ int run_one(const Job& job, const std::string& edges_path, const std::string& pa
   }
   nlohmann::json result =
       localize_json(job.localizer.outline(), job.options.planned, found, certificates, spent.count());
+  const localize::HeightFit heights =
+      localize::fit_heights(seen.edges, seen.top_z_mm, seen.table_z_mm, found.centroid_base);
+  result["top"] = plane_json(heights.top);
+  result["table"] = plane_json(heights.table);
   if (!file.empty()) result["file"] = file;
   if (job.json) {
     std::printf("%s\n", result.dump().c_str());

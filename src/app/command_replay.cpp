@@ -215,7 +215,10 @@ int command_dump(Arguments arguments) {
     return 1;
   }
   if (topic == "points") dump_points(*solution);
-  if (topic == "edges") std::fputs(files::edges_csv(solution->evidence.edges).c_str(), stdout);
+  if (topic == "edges") {
+    const job::Evidence& evidence = solution->evidence;
+    std::fputs(files::edges_csv(evidence.edges, evidence.top_z_mm, evidence.table_z_mm).c_str(), stdout);
+  }
   if (topic == "path") std::fputs(files::path_csv(solution->evidence.path).c_str(), stdout);
   if (topic == "welds") {
     std::puts("name,bound_mm,tolerance_mm,gap_mm,verdict");

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/localize_json.hpp"
 #include "weldcell/base/units.hpp"
 
 namespace weldcell::app {
@@ -67,6 +68,7 @@ review::ReportInput JobStory::report(const job::Cell& cell, const cell::CellSetu
     input.edges = solution->evidence.edges;
     input.path = solution->evidence.path;
     input.found = solution->found;
+    input.heights = solution->heights;
     input.certificates = solution->certificates;
     const auto& align = solution->evidence.align;
     input.figures = {
@@ -127,24 +129,10 @@ std::string JobStory::result_json(const job::Cell& cell) const {
     out["inliers"] = found.inliers;
     out["mean_error_mm"] = found.mean_error_mm;
     out["latency_ms"] = found.latency_s ? json(*found.latency_s * 1e3) : json();
-    out["welds"] = json::array();
-    for (const auto& c : solution->certificates) {
-      out["welds"].push_back({{"name", c.name},
-                              {"bound_mm", c.bound_mm},
-                              {"tolerance_mm", c.tolerance_mm},
-                              {"gap_mm", c.gap_mm},
-                              {"verdict", localize::to_string(c.verdict)},
-                              {"reason", c.reason}});
-    }
-    out["members"] = json::array();
-    for (const auto& m : found.members) {
-      out["members"].push_back({{"name", m.name},
-                                {"dx_mm", m.dx_mm},
-                                {"dy_mm", m.dy_mm},
-                                {"dtheta_deg", deg(m.dtheta_rad)},
-                                {"sigma_mm", m.sigma_mm},
-                                {"points", m.points}});
-    }
+    out["welds"] = welds_json(solution->certificates);
+    out["members"] = members_json(found);
+    out["top"] = plane_json(solution->heights.top);
+    out["table"] = plane_json(solution->heights.table);
   }
   return out.dump(1);
 }

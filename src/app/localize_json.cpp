@@ -22,32 +22,6 @@ json alternatives_json(const localize::Localization& found) {
   return out;
 }
 
-json members_json(const localize::Localization& found) {
-  json out = json::array();
-  for (const localize::MemberPose& m : found.members) {
-    out.push_back({{"name", m.name},
-                   {"dx_mm", m.dx_mm},
-                   {"dy_mm", m.dy_mm},
-                   {"dtheta_deg", deg(m.dtheta_rad)},
-                   {"sigma_mm", m.sigma_mm},
-                   {"points", m.points}});
-  }
-  return out;
-}
-
-json welds_json(const std::vector<weld::WeldCertificate>& certificates) {
-  json out = json::array();
-  for (const weld::WeldCertificate& c : certificates) {
-    out.push_back({{"name", c.name},
-                   {"bound_mm", c.bound_mm},
-                   {"tolerance_mm", c.tolerance_mm},
-                   {"verdict", localize::to_string(c.verdict)},
-                   {"gap_mm", c.gap_mm},
-                   {"reason", c.reason}});
-  }
-  return out;
-}
-
 double sigma(double variance) { return std::sqrt(std::max(variance, 0.0)); }
 
 /// Covariance and sigmas; null where none was estimated: a zero would claim that the place is known exactly.
@@ -64,6 +38,45 @@ void add_uncertainty(const localize::Localization& found, json& out) {
 }
 
 }  // namespace
+
+nlohmann::json members_json(const localize::Localization& found) {
+  json out = json::array();
+  for (const localize::MemberPose& m : found.members) {
+    out.push_back({{"name", m.name},
+                   {"dx_mm", m.dx_mm},
+                   {"dy_mm", m.dy_mm},
+                   {"dtheta_deg", deg(m.dtheta_rad)},
+                   {"sigma_mm", m.sigma_mm},
+                   {"points", m.points}});
+  }
+  return out;
+}
+
+nlohmann::json welds_json(const std::vector<weld::WeldCertificate>& certificates) {
+  json out = json::array();
+  for (const weld::WeldCertificate& c : certificates) {
+    out.push_back({{"name", c.name},
+                   {"bound_mm", c.bound_mm},
+                   {"tolerance_mm", c.tolerance_mm},
+                   {"verdict", localize::to_string(c.verdict)},
+                   {"gap_mm", c.gap_mm},
+                   {"reason", c.reason}});
+  }
+  return out;
+}
+
+nlohmann::json plane_json(const std::optional<localize::TiltedPlane>& plane) {
+  if (!plane) return {};
+  const Eigen::Matrix3d& c = plane->covariance;
+  return {{"z_mm", plane->z_mm},
+          {"z_sigma_mm", sigma(c(0, 0))},
+          {"roll_deg", deg(plane->slope_y)},
+          {"roll_sigma_deg", deg(sigma(c(2, 2)))},
+          {"pitch_deg", deg(-plane->slope_x)},
+          {"pitch_sigma_deg", deg(sigma(c(1, 1)))},
+          {"points", plane->points},
+          {"rms_mm", plane->rms_mm}};
+}
 
 nlohmann::json localize_json(const workpiece::OutlineTemplate& outline, const Pose2& planned,
                              const localize::Localization& found,

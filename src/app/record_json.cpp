@@ -1,6 +1,7 @@
 // Outputs and answers of heavy steps as JSON: full digits, so that equal text means equal bits.
 #include <nlohmann/json.hpp>
 
+#include "app/localize_json.hpp"
 #include "weldcell/app/record.hpp"
 #include "weldcell/base/units.hpp"
 
@@ -43,15 +44,6 @@ json solution_json(const job::Solution& solution) {
   json edges = json::array();
   for (const EdgePoint& e : solution.evidence.edges)
     edges.push_back({e.x_mm, e.y_mm, e.dir_x, e.dir_y, e.step, e.sigma_mm});
-  json welds = json::array();
-  for (const auto& c : solution.certificates) {
-    welds.push_back({{"name", c.name},
-                     {"bound_mm", c.bound_mm},
-                     {"tolerance_mm", c.tolerance_mm},
-                     {"gap_mm", c.gap_mm},
-                     {"verdict", localize::to_string(c.verdict)},
-                     {"reason", c.reason}});
-  }
   json covariance = json::array();
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) covariance.push_back(solution.found.covariance(i, k));
@@ -66,7 +58,7 @@ json solution_json(const job::Solution& solution) {
           {"mean_error_mm", solution.found.mean_error_mm},
           {"latency_s", solution.found.latency_s ? json(*solution.found.latency_s) : json()},
           {"edges", edges},
-          {"welds", welds},
+          {"welds", welds_json(solution.certificates)},
           {"rapid_digest", text_digest(solution.rapid)}};
 }
 

@@ -288,7 +288,7 @@ VirtualOutcome VirtualCell::outcome() const {
   VirtualOutcome out = s.outcome;
   out.truth = s.scene.truth;
   out.virtual_s = now_s();
-  out.seam_error_mm = sim::seam_errors_mm(s.scene, s.controller.weld_traces());
+  out.welded = sim::welded_seams(s.scene, s.controller.weld_traces());
   if (!s.daemon) return out;
   const job::Cell& cell = s.daemon->cell;
   out.passes = cell.status().pass;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -33,6 +34,7 @@ std::string shown(std::string_view text) {
 struct Column {
   const char* name;
   bool required;
+  bool may_be_empty = false;  ///< an empty field is NaN
 };
 
 /// A CSV of numbers with a header: the columns in any order, required and optional ones.
@@ -124,6 +126,7 @@ class Table {
     const std::size_t count = split(text, [&](std::size_t at, std::string_view field) {
       for (std::size_t c = 0; c < columns_.size(); ++c) {
         if (place_[c] != static_cast<int>(at)) continue;
+        if (field.empty() && columns_[c].may_be_empty) continue;
         if (field.size() > 1 && field.front() == '+') field.remove_prefix(1);
         const auto [rest, error] = std::from_chars(field.data(), field.data() + field.size(), values[c]);
         if (error != std::errc{} || rest != field.data() + field.size() || !std::isfinite(values[c])) {
@@ -150,7 +153,7 @@ double or_zero(double value) { return std::isnan(value) ? 0 : value; }
 
 }  // namespace
 
-std::variant<std::vector<EdgePoint>, Faults> parse_edges(std::string_view csv, const std::string& name) {
+std::variant<EdgeSet, Faults> parse_edges(std::string_view csv, const std::string& name) {
   Table table(csv, name,
               {{"x_mm", true},
                {"y_mm", true},
@@ -159,8 +162,10 @@ std::variant<std::vector<EdgePoint>, Faults> parse_edges(std::string_view csv, c
                {"step", true},
                {"sigma_mm", false},
                {"speed_mm_s", false},
-               {"shadowed", false}});
-  std::vector<EdgePoint> out;
+               {"shadowed", false},
+               {"top_z_mm", false, true},
+               {"table_z_mm", false, true}});
+  EdgeSet out;
   table.read([&](const std::vector<double>& v, int line) {
     EdgePoint e{
         v[0], v[1], v[2], v[3], static_cast<int>(v[4]), or_zero(v[5]), or_zero(v[6]), or_zero(v[7]) != 0};
@@ -176,9 +181,14 @@ std::variant<std::vector<EdgePoint>, Faults> parse_edges(std::string_view csv, c
       table.fault(line, "step", fmt::format("{:g} is no step", v[4]), "1, 0 or -1");
     if (e.sigma_mm < 0) table.fault(line, "sigma_mm", "is negative", "0 = unknown");
     if (e.speed_mm_s < 0) table.fault(line, "speed_mm_s", "is negative", "0 = unknown");
-    out.push_back(e);
+    out.edges.push_back(e);
+    out.top_z_mm.push_back(v[8]);
+    out.table_z_mm.push_back(v[9]);
   });
   if (!table.faults.empty()) return table.faults;
+  for (std::vector<double>* heights : {&out.top_z_mm, &out.table_z_mm}) {
+    if (std::ranges::all_of(*heights, [](double z) { return std::isnan(z); })) heights->clear();
+  }
   return out;
 }
 
@@ -219,15 +229,24 @@ std::variant<std::vector<calibrate::GaugeCrossing>, Faults> parse_gauge(std::str
   return out;
 }
 
-std::string edges_csv(const std::vector<EdgePoint>& edges) {
-  bool shadows = false;
-  for (const EdgePoint& e : edges) shadows = shadows || e.shadowed;
+std::string edges_csv(std::span<const EdgePoint> edges, std::span<const double> top_z_mm,
+                      std::span<const double> table_z_mm) {
+  const bool shadows = std::ranges::any_of(edges, &EdgePoint::shadowed);
   std::string out = "x_mm,y_mm,dir_x,dir_y,step,sigma_mm,speed_mm_s";
-  out += shadows ? ",shadowed\n" : "\n";
-  for (const EdgePoint& e : edges) {
+  if (shadows) out += ",shadowed";
+  if (!top_z_mm.empty()) out += ",top_z_mm";
+  if (!table_z_mm.empty()) out += ",table_z_mm";
+  out += "\n";
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const EdgePoint& e = edges[i];
     out += fmt::format("{:.4f},{:.4f},{:.6f},{:.6f},{},{:.4f},{:.3f}", e.x_mm, e.y_mm, e.dir_x, e.dir_y,
                        e.step, e.sigma_mm, e.speed_mm_s);
-    out += shadows ? (e.shadowed ? ",1\n" : ",0\n") : "\n";
+    if (shadows) out += e.shadowed ? ",1" : ",0";
+    for (const std::span<const double> heights : {top_z_mm, table_z_mm}) {
+      // An empty field = unknown.
+      if (!heights.empty()) out += std::isfinite(heights[i]) ? fmt::format(",{:.4f}", heights[i]) : ",";
+    }
+    out += "\n";
   }
   return out;
 }

@@ -149,6 +149,7 @@ std::string report_html(const ReportInput& in) {
       section("fit", "The fit", fit_figure(in) + alternatives(in), "The part was not measured in this job.");
   body += section("welds", "Welds", weld_table(in), "No weld was certified in this job.");
   body += section("members", "Members", member_table(in));
+  body += section("height", "Height and tilt", height_table(in));
   body += section("residuals", "Residuals", residuals);
   body += section("edges", "Edges", edge_figure(in));
   body += section("scan", "Scan", scan_figure(in) + pass_table(in));
@@ -161,6 +162,7 @@ std::string report_html(const ReportInput& in) {
   for (const auto& [id, name] : {std::pair{"fit", "Fit"},
                                  {"welds", "Welds"},
                                  {"members", "Members"},
+                                 {"height", "Height"},
                                  {"residuals", "Residuals"},
                                  {"edges", "Edges"},
                                  {"scan", "Scan"},

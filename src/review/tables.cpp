@@ -91,6 +91,31 @@ std::string member_table(const ReportInput& in) {
       rows);
 }
 
+std::string height_table(const ReportInput& in) {
+  std::string rows;
+  for (const auto& [name, plane] :
+       {std::pair{"top of the part", &in.heights.top}, {"table", &in.heights.table}}) {
+    if (!*plane) continue;
+    const localize::TiltedPlane& p = **plane;
+    const auto sigma = [&p](int i) { return std::sqrt(std::max(0.0, p.covariance(i, i))); };
+    const auto with_sigma = [](double v, double s, int digits) {
+      return signed_number(v, digits) + " <span class=\"unit\">&#177;" + number(s, digits) + "</span>";
+    };
+    rows += "<tr>" + row_head(name) + value(with_sigma(p.z_mm, sigma(0), 2)) +
+            value(with_sigma(deg(p.slope_y), deg(sigma(2)), 3)) +
+            value(with_sigma(deg(-p.slope_x), deg(sigma(1)), 3)) + value(number(p.rms_mm, 2)) +
+            value(std::to_string(p.points)) + "</tr>\n";
+  }
+  if (rows.empty()) return "";
+  return table(
+      "Height at the middle of the part and tilt against the robot's base, with 1 sigma, from the heights "
+      "beside each "
+      "edge. Welds follow the measured top.",
+      head("surface") + head("height, mm", true) + head("roll about x, deg", true) +
+          head("pitch about y, deg", true) + head("scatter, mm", true) + head("edge points", true),
+      rows);
+}
+
 std::string pass_table(const ReportInput& in) {
   if (in.passes.empty()) return "";
   double end = 0;

@@ -77,6 +77,7 @@ struct LaserDevice::State {
         wire(s.cell.laser_format),
         spot(spot_points(s.laser.beam_spot)),
         baseline_mm((setup.start_of_range_mm + setup.range_mm / 2) * std::tan(truth.triangulation_rad)),
+        to_level(from_level(s).inverse()),
         surface(s, 0.8 * s.laser.spot_mm + 0.2) {
     per_block = static_cast<std::size_t>(std::lround(wire.gather_s() * setup.rate_hz));
     per_block = std::clamp<std::size_t>(per_block, 1, wire.most_samples());
@@ -100,8 +101,9 @@ struct LaserDevice::State {
   Peak strongest(std::array<Seen, kSpotPoints>& seen, std::size_t count) const;
   Peak peak(const Eigen::Isometry3d& laser, HostTime t, std::uint64_t k, const PoseAt& pose_at);
   Sample measure(std::uint64_t k, HostTime t, const PoseAt& pose_at);
+  /// The laser against the table as if that were level: rays and distances do not change by the turn.
   Eigen::Isometry3d beam(HostTime t, const PoseAt& pose_at) const {
-    return pose_at(t).iso * setup.T_flange_laser.iso;
+    return to_level * pose_at(t).iso * setup.T_flange_laser.iso;
   }
   void finish_block(HostTime last, std::vector<LaserBlock>& out);
 
@@ -111,6 +113,7 @@ struct LaserDevice::State {
   const LaserWire wire;
   const std::vector<SpotPoint> spot;
   const double baseline_mm;
+  const Eigen::Isometry3d to_level;
   Surface surface;
   ExposureLoop exposure;
   std::size_t per_block = 20;

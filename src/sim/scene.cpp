@@ -33,21 +33,27 @@ Pose2 deviation(const Scene& scene, std::size_t i) {
   return {shift.x(), shift.y(), off.dtheta_rad};
 }
 
-/// Distance of p across the line; beyond its ends only the part across counts.
-double across(const Vec2& p, const std::vector<Eigen::Vector3d>& line) {
-  double best = std::numeric_limits<double>::infinity(), out = 0;
+/// Where p lies against the line: across it in plan (beyond its ends only the part across counts), and over
+/// it.
+struct Miss {
+  double across_mm = 0, over_mm = 0;
+};
+Miss miss(const Eigen::Vector3d& p, const std::vector<Eigen::Vector3d>& line) {
+  double best = std::numeric_limits<double>::infinity();
+  Miss out;
   for (std::size_t i = 0; i + 1 < line.size(); ++i) {
     const Segment piece{line[i].head<2>(), line[i + 1].head<2>()};
     if (piece.length() < 1e-9) continue;
-    const double d = distance(p, piece);
+    const double d = distance(p.head<2>(), piece);
     if (d >= best) continue;
     best = d;
-    const Vec2 along = piece.direction(), from = p - piece.a;
+    const Vec2 along = piece.direction(), from = p.head<2>() - piece.a;
     const double t = along.dot(from);
     const bool before = i == 0 && t < 0, behind = i + 2 == line.size() && t > piece.length();
-    out = before || behind ? std::abs(along.x() * from.y() - along.y() * from.x()) : d;
+    out.across_mm = before || behind ? std::abs(along.x() * from.y() - along.y() * from.x()) : d;
+    out.over_mm = p.z() - (line[i].z() + (line[i + 1].z() - line[i].z()) * t / piece.length());
   }
-  return std::isfinite(best) ? out : 0;
+  return out;
 }
 
 double mean_distance(const WeldTrace& trace, const TrueSeam& seam) {
@@ -65,6 +71,18 @@ double mean_distance(const WeldTrace& trace, const TrueSeam& seam) {
 }
 
 }  // namespace
+
+Eigen::Isometry3d from_level(const Scene& scene) {
+  const Vec2 middle = scene.planned * center_of(scene.workpiece);
+  const Eigen::Vector3d pivot(middle.x(), middle.y(),
+                              scene.cell.setup.table.z_mm + scene.workpiece.height_mm);
+  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
+  out.translate(pivot + Eigen::Vector3d(0, 0, scene.table.lift_mm));
+  out.rotate(Eigen::AngleAxisd(scene.table.pitch_rad, Eigen::Vector3d::UnitY()) *
+             Eigen::AngleAxisd(scene.table.roll_rad, Eigen::Vector3d::UnitX()));
+  out.translate(-pivot);
+  return out;
+}
 
 Pose2 placed(const workpiece::Workpiece& workpiece, const Pose2& planned, double xy_mm, double theta_rad,
              std::uint64_t seed) {
@@ -91,6 +109,7 @@ std::vector<MemberTruth> deviated(const workpiece::Workpiece& workpiece, const M
 }
 
 std::vector<TrueSeam> true_seams(const Scene& scene) {
+  const Eigen::Isometry3d level = from_level(scene);
   std::vector<TrueSeam> out;
   for (const workpiece::Weld& weld : scene.workpiece.welds) {
     TrueSeam seam{weld.name, {}};
@@ -107,7 +126,7 @@ std::vector<TrueSeam> true_seams(const Scene& scene) {
       Vec2 mean = Vec2::Zero();
       for (const Pose2& move : moves) mean += move * p.head<2>() / static_cast<double>(moves.size());
       const Vec2 at = scene.truth * mean;
-      seam.line_mm.emplace_back(at.x(), at.y(), scene.cell.setup.table.z_mm + p.z());
+      seam.line_mm.push_back(level * Eigen::Vector3d(at.x(), at.y(), scene.cell.setup.table.z_mm + p.z()));
     }
     out.push_back(std::move(seam));
   }
@@ -125,18 +144,15 @@ std::vector<WeldedSeam> welded_seams(const Scene& scene, const std::vector<WeldT
       const double d = mean_distance(trace, seam);
       if (d < nearest) nearest = d, welded = &seam;
     }
-    WeldedSeam one{welded ? welded->name : trace.seam, 0};
+    WeldedSeam one{welded ? welded->name : trace.seam};
     for (const Eigen::Vector3d& p : trace.tcp_mm) {
-      if (welded) one.lateral_error_mm = std::max(one.lateral_error_mm, across(p.head<2>(), welded->line_mm));
+      if (!welded) break;
+      const Miss off = miss(p, welded->line_mm);
+      one.lateral_error_mm = std::max(one.lateral_error_mm, off.across_mm);
+      one.height_error_mm = std::max(one.height_error_mm, std::abs(off.over_mm));
     }
     out.push_back(std::move(one));
   }
-  return out;
-}
-
-std::vector<double> seam_errors_mm(const Scene& scene, const std::vector<WeldTrace>& traces) {
-  std::vector<double> out;
-  for (const WeldedSeam& seam : welded_seams(scene, traces)) out.push_back(seam.lateral_error_mm);
   return out;
 }
 
@@ -152,6 +168,9 @@ std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces,
   out["planned"] = {{"x_mm", scene.planned.x_mm},
                     {"y_mm", scene.planned.y_mm},
                     {"theta_deg", deg(scene.planned.theta_rad)}};
+  out["table"] = {{"lift_mm", scene.table.lift_mm},
+                  {"roll_deg", deg(scene.table.roll_rad)},
+                  {"pitch_deg", deg(scene.table.pitch_rad)}};
   out["members"] = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < scene.workpiece.members.size(); ++i) {
     const MemberTruth off = i < scene.members.size() ? scene.members[i] : MemberTruth{};
@@ -178,7 +197,9 @@ std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces,
                        {"feedback_latency_ms", scene.controller.feedback_latency_ms}};
   out["welded"] = nlohmann::ordered_json::array();
   for (const WeldedSeam& seam : welded_seams(scene, traces)) {
-    out["welded"].push_back({{"seam", seam.seam}, {"lateral_error_mm", seam.lateral_error_mm}});
+    out["welded"].push_back({{"seam", seam.seam},
+                             {"lateral_error_mm", seam.lateral_error_mm},
+                             {"height_error_mm", seam.height_error_mm}});
   }
   out["motions_s"] = nlohmann::ordered_json::array();
   for (const MotionSpan& motion : motions) out["motions_s"].push_back({motion.begin_s, motion.end_s});

@@ -58,6 +58,11 @@ class SceneReader {
     out_.truth = out_.planned;
     read_placement(map);
     read_members(map);
+    section(map, "table", Need::Optional, [&](Map& m) {
+      m.number("lift_mm", out_.table.lift_mm, {-50, 50});
+      m.degrees("roll_deg", out_.table.roll_rad, {-2, 2});
+      m.degrees("pitch_deg", out_.table.pitch_rad, {-2, 2});
+    });
     section(map, "laser", Need::Optional, [&](Map& m) { laser(m); });
     section(map, "controller", Need::Optional, [&](Map& m) { controller(m); });
     section(map, "plc", Need::Optional, [&](Map& m) {

@@ -403,9 +403,9 @@ def alone_and_supervised(bin_dir):
 
 
 def trials(bin_dir):
-    def run(threads, scene="ladder"):
+    def run(threads, scene="ladder", *words):
         out = subprocess.run([os.path.join(bin_dir, "weldcell"), "trials", "--workpiece", scene, "--count", "4", "--seed", "11",
-                              "--threads", str(threads), "--json"], capture_output=True, text=True)
+                              "--threads", str(threads), "--json", *words], capture_output=True, text=True)
         check(out.returncode == 0, out.stderr)
         return out.stdout
 
@@ -420,6 +420,12 @@ def trials(bin_dir):
     result = json.loads(hard)
     check(result["failures"] == 0, f"failures: {hard}")
     check(result["x_mm"]["worst"] < 0.25 and result["y_mm"]["worst"] < 0.25 and result["theta_deg"]["worst"] < 0.1, hard)
+    # A table 1.2 mm higher than configured and not level: the torch follows the measured top, not the cell file.
+    tilted = run(2, "ladder-tilted", "--weld")
+    result = json.loads(tilted)
+    check(result["failures"] == 0, f"failures: {tilted}")
+    check(result["seam_height_mm"]["worst"] < 0.2, f"torch over the seam: {tilted}")
+    check(result["seam_mm"]["worst"] < 0.3, f"torch beside the seam: {tilted}")
 
 
 def main():

@@ -30,8 +30,8 @@ struct VirtualOutcome {
   Vec2 centroid_error_mm = Vec2::Zero();  ///< found - truth at the template's centroid, Base axes
   double theta_error_rad = 0;
   std::vector<weld::WeldCertificate> certificates;
-  std::vector<double> seam_error_mm;  ///< torch's worst lateral error on the true seam, one a welded seam
-  double scan_s = 0;                  ///< virtual time of all passes
+  std::vector<sim::WeldedSeam> welded;
+  double scan_s = 0;  ///< virtual time of all passes
   double virtual_s = 0;
   int passes = 0, points = 0;
   std::shared_ptr<const job::Solution> solution;  ///< of the last localization; null when there was none

@@ -10,6 +10,7 @@
 #include "weldcell/align/aligner.hpp"
 #include "weldcell/geometry/edge_point.hpp"
 #include "weldcell/guidance/drawing.hpp"
+#include "weldcell/localize/height.hpp"
 #include "weldcell/localize/localize.hpp"
 #include "weldcell/plan/scan_plan.hpp"
 #include "weldcell/weld/certificate.hpp"
@@ -72,7 +73,8 @@ struct ReportInput {
   std::vector<EdgePoint> edges;
   std::vector<PathPiece> path;
   std::optional<localize::Localization> found;
-  std::optional<Pose2> truth;  ///< simulated cells only: where the part really lay
+  localize::HeightFit heights;  ///< of the part's top and of the table
+  std::optional<Pose2> truth;   ///< simulated cells only: where the part really lay
   std::vector<weld::WeldCertificate> certificates;
   std::vector<double>
       seam_error_mm;  ///< simulated cells only: torch's worst lateral error, one a weld; may be empty

@@ -2,7 +2,7 @@
 // file; its truth is written to a file that the daemon never sees.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <string>
 #include <variant>
@@ -48,6 +48,13 @@ struct MemberSpread {
   double angle_rad = 0;  ///< 1 sigma
 };
 
+/// How the table really stands against where the cell's configuration puts it: lifted, and turned about the
+/// middle of the planned part's top (roll about Base x after pitch about Base y). All that lies on it goes
+/// with it.
+struct TableTruth {
+  double lift_mm = 0, roll_rad = 0, pitch_rad = 0;
+};
+
 struct TimedFault {
   /// What `at_s` counts from: the simulator's start, the first guided motion, the first arc.
   enum class After : std::uint8_t { Start, Scan, Weld };
@@ -63,13 +70,17 @@ struct Scene {
   files::CellConfig cell;            ///< endpoints and true geometry of the same cell
   workpiece::Workpiece workpiece;    ///< real shape
   Pose2 planned;                     ///< where it was meant to lie; truth = planned moved by the placement
-  Pose2 truth;                       ///< Part in Base
+  Pose2 truth;                       ///< Part in Base; on a tilted table to second order in the tilt
   std::vector<MemberTruth> members;  ///< one a member
+  TableTruth table;
   LaserTruth laser;
   ControllerTruth controller;
   std::vector<TimedFault> faults;
   double plc_confirm_after_s = 0.3;  ///< the simulated worker's pace
 };
+
+/// Maps where things would be on a level table at the configured height to where they are, both in Base.
+Eigen::Isometry3d from_level(const Scene& scene);
 
 /// Placement drawn from a seed: uniform within +-xy_mm and +-theta_rad about the centroid of `planned`.
 Pose2 placed(const workpiece::Workpiece& workpiece, const Pose2& planned, double xy_mm, double theta_rad,
@@ -97,7 +108,7 @@ struct MotionSpan {
   double begin_s = 0, end_s = 0;
 };
 
-/// A seam as it really lies: points of its line in Base, at the height of the drawing above the table.
+/// A seam as it really lies: points of its line in Base.
 struct TrueSeam {
   std::string name;
   std::vector<Eigen::Vector3d> line_mm;
@@ -108,9 +119,9 @@ std::vector<TrueSeam> true_seams(const Scene& scene);
 struct WeldedSeam {
   std::string seam;             ///< name of the true seam; the trace's own when the scene has no welds
   double lateral_error_mm = 0;  ///< largest distance across the seam, in plan
+  double height_error_mm = 0;   ///< largest distance over or under it
 };
 std::vector<WeldedSeam> welded_seams(const Scene& scene, const std::vector<WeldTrace>& traces);
-std::vector<double> seam_errors_mm(const Scene& scene, const std::vector<WeldTrace>& traces);
 
 /// truth.json: pose, members, seams' true lines, latency, clocks; with traces also what was welded and how
 /// far off; when the arm moved, in seconds of the caller's clock.

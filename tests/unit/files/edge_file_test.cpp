@@ -19,14 +19,36 @@ std::string faults_of(std::string_view csv) {
 TEST(EdgeFile, ReadsColumnsInAnyOrderAndOptionalOnes) {
   const auto parsed =
       parse_edges("\r\nstep,x_mm, y_mm ,dir_x,dir_y\r\n# note\n+1,10,20.5,1,0\r\n-1,-3e1,0,0,0\n", "e.csv");
-  ASSERT_TRUE(std::holds_alternative<std::vector<EdgePoint>>(parsed)) << text(std::get<Faults>(parsed));
-  const auto& e = std::get<std::vector<EdgePoint>>(parsed);
+  ASSERT_TRUE(std::holds_alternative<EdgeSet>(parsed)) << text(std::get<Faults>(parsed));
+  const auto& e = std::get<EdgeSet>(parsed).edges;
   ASSERT_EQ(e.size(), 2u);
   EXPECT_EQ(e[0].step, 1);
   EXPECT_DOUBLE_EQ(e[0].y_mm, 20.5);
   EXPECT_DOUBLE_EQ(e[0].sigma_mm, 0);
   EXPECT_DOUBLE_EQ(e[1].x_mm, -30);
   EXPECT_DOUBLE_EQ(e[1].dir_x, 0);
+}
+
+TEST(EdgeFile, HeightsBesideAnEdgeMayBeUnknown) {
+  const auto parsed = parse_edges(
+      "x_mm,y_mm,dir_x,dir_y,step,top_z_mm,table_z_mm\n1,2,1,0,1,52.5,\n1,2,1,0,1,,\n1,2,1,0,1,nan,12\n",
+      "e.csv");
+  ASSERT_TRUE(std::holds_alternative<Faults>(parsed));
+  EXPECT_THAT(text(std::get<Faults>(parsed)), HasSubstr("e.csv:4: top_z_mm: 'nan' is not a finite number"));
+  const auto sound =
+      parse_edges("x_mm,y_mm,dir_x,dir_y,step,top_z_mm,table_z_mm\n1,2,1,0,1,52.5,\n1,2,1,0,1,,\n", "e.csv");
+  ASSERT_TRUE(std::holds_alternative<EdgeSet>(sound)) << text(std::get<Faults>(sound));
+  const auto& set = std::get<EdgeSet>(sound);
+  ASSERT_EQ(set.top_z_mm.size(), 2u);
+  EXPECT_DOUBLE_EQ(set.top_z_mm[0], 52.5);
+  EXPECT_TRUE(std::isnan(set.top_z_mm[1]));
+  EXPECT_TRUE(set.table_z_mm.empty()) << "a column without a height is as none";
+  const std::string again = edges_csv(set.edges, set.top_z_mm, set.table_z_mm);
+  EXPECT_THAT(again, HasSubstr(",top_z_mm\n"));
+  EXPECT_THAT(again, HasSubstr(",52.5000\n"));
+  const auto back = parse_edges(again, "e.csv");
+  ASSERT_TRUE(std::holds_alternative<EdgeSet>(back)) << again;
+  EXPECT_TRUE(std::isnan(std::get<EdgeSet>(back).top_z_mm[1]));
 }
 
 TEST(EdgeFile, SaysEachFaultWithItsLine) {
@@ -100,9 +122,8 @@ TEST(EdgeFile, WhatIsPrintedReadsBackTheSame) {
     }
     const std::string csv = edges_csv(edges);
     const auto parsed = parse_edges(csv, "e.csv");
-    ASSERT_TRUE(std::holds_alternative<std::vector<EdgePoint>>(parsed))
-        << csv << text(std::get<Faults>(parsed));
-    const auto& back = std::get<std::vector<EdgePoint>>(parsed);
+    ASSERT_TRUE(std::holds_alternative<EdgeSet>(parsed)) << csv << text(std::get<Faults>(parsed));
+    const auto& back = std::get<EdgeSet>(parsed).edges;
     ASSERT_EQ(back.size(), edges.size());
     for (std::size_t i = 0; i < edges.size(); ++i) {
       EXPECT_NEAR(back[i].x_mm, edges[i].x_mm, 6e-5);

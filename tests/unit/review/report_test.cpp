@@ -117,6 +117,26 @@ TEST(Report, ShowsEveryPartOfTheJob) {
   EXPECT_THAT(html, Not(HasSubstr("What to do"))) << "a finished job asks for nothing";
 }
 
+TEST(Report, ShowsHeightAndTiltOfPartAndTable) {
+  ReportInput in = test::sample_input();
+  EXPECT_THAT(report_html(in), Not(HasSubstr("id=\"height\""))) << "without heights there is nothing to show";
+  localize::TiltedPlane plane;
+  plane.z_mm = 541.25;
+  plane.slope_x = rad(0.5);
+  plane.slope_y = rad(0.25);
+  plane.covariance = Eigen::Vector3d(0.0004, rad(0.01) * rad(0.01), rad(0.02) * rad(0.02)).asDiagonal();
+  plane.points = 321;
+  in.heights.top = plane;
+  const std::string html = report_html(in);
+  EXPECT_EQ(first_fault(html), "");
+  const auto row = html.substr(html.find("top of the part"), 400);
+  EXPECT_THAT(row, HasSubstr("+541.25 <span class=\"unit\">&#177;0.02"));
+  EXPECT_THAT(row, HasSubstr("+0.250 <span class=\"unit\">&#177;0.020"));
+  EXPECT_THAT(row, HasSubstr("-0.500 <span class=\"unit\">&#177;0.010"));
+  EXPECT_THAT(row, HasSubstr("321"));
+  EXPECT_THAT(html, Not(HasSubstr("<th scope=\"row\">table</th>")));
+}
+
 TEST(Report, DrawsTheFoundOutlineWhereItWasFound) {
   auto in = test::sample_input();
   in.workpiece.members.resize(1);

@@ -77,6 +77,23 @@ TEST(Laser, ReadsTableAndTop) {
   }
 }
 
+TEST(Laser, SeesATableThatIsLiftedAndTilted) {
+  Scene scene = quiet();
+  scene.table = {1, 0, rad(0.5)};
+  // The middle of the planned part's top lies at (1000, 20, 540); pitch lowers what lies at larger x.
+  const double slope = -std::tan(rad(0.5)), rise = 40 / std::cos(rad(0.5));
+  int on_table = 0, on_top = 0;
+  for (const Sample& sample : sweep(scene, 700, 1300, 20, 90)) {
+    if (std::abs(std::abs(sample.x_mm - 1000) - 200) < 3) continue;
+    const double top_mm = 541 + slope * (sample.x_mm - 1000);
+    const bool top = std::abs(sample.x_mm - 1000) < 200;
+    ++(top ? on_top : on_table);
+    ASSERT_NEAR(sample.reading.distance_mm, 770 - 130 - (top ? top_mm : top_mm - rise), 2e-4) << sample.x_mm;
+  }
+  EXPECT_GT(on_table, 5000);
+  EXPECT_GT(on_top, 5000);
+}
+
 TEST(Laser, PlaneAlongTheEdgeStepsAtTheEdge) {
   // Receiver across the travel: no shadow, the step stands where the bar ends.
   EXPECT_NEAR(crossing(sweep(quiet(), 780, 820, 20, 90), 120), 800, 0.05);

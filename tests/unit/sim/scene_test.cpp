@@ -42,7 +42,7 @@ TEST(Scene, PlacementStaysInItsRangeAndFollowsTheSeed) {
 }
 
 TEST(Scene, ShippedScenesRead) {
-  for (const char* name : {"ladder", "mitre"}) {
+  for (const char* name : {"ladder", "ladder-differs", "ladder-shop-floor", "ladder-tilted", "mitre"}) {
     auto read = read_scene(std::string(WELDCELL_CONFIG) + "/scenes/" + name + ".yaml", test_scene().cell, 3);
     if (const auto* faults = std::get_if<files::Faults>(&read)) FAIL() << files::text(*faults);
     const Scene& scene = std::get<Scene>(read);
@@ -100,6 +100,35 @@ TEST(Scene, TruthTellsPoseSeamsAndTorch) {
   EXPECT_EQ(truth["welded"][0]["seam"], seam.name);
   EXPECT_NEAR(truth["welded"][0]["lateral_error_mm"].get<double>(), 0.25, 1e-6);
   EXPECT_EQ(truth["latency_ms"], 2.7);
+}
+
+TEST(Scene, ATiltedTableTakesItsSeamsAlongAndTellsTheTorchsHeight) {
+  const std::string level = "scene: x\n" + kWorkpiece + "planned: {x_mm: 1250, y_mm: -600, theta_deg: 90}\n";
+  auto flat = read_text(level),
+       tilted = read_text(level + "table: {lift_mm: 1.5, roll_deg: 0.4, pitch_deg: -0.3}\n");
+  ASSERT_TRUE(std::holds_alternative<Scene>(flat)) << files::text(std::get<files::Faults>(flat));
+  ASSERT_TRUE(std::holds_alternative<Scene>(tilted)) << files::text(std::get<files::Faults>(tilted));
+  const auto before = true_seams(std::get<Scene>(flat)), after = true_seams(std::get<Scene>(tilted));
+  ASSERT_EQ(before.size(), after.size());
+  // By the slopes alone: z rises by tan(roll) along y and by -tan(pitch) along x.
+  const Vec2 middle = std::get<Scene>(flat).planned * Vec2(597.679, 300);  // centroid of the members
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    for (std::size_t k = 0; k < before[i].line_mm.size(); ++k) {
+      const Eigen::Vector3d &a = before[i].line_mm[k], &b = after[i].line_mm[k];
+      EXPECT_LT((b - a).head<2>().norm(), 0.04) << "tops keep their place to second order";
+      const double rise =
+          1.5 + std::tan(rad(0.4)) * (a.y() - middle.y()) + std::tan(rad(0.3)) * (a.x() - middle.x());
+      EXPECT_NEAR(b.z() - a.z(), rise, 0.02);
+    }
+  }
+  // A torch that welds as if the table were level.
+  const auto welded = welded_seams(std::get<Scene>(tilted), {{before[0].name, before[0].line_mm}});
+  ASSERT_EQ(welded.size(), 1u);
+  EXPECT_LT(welded[0].lateral_error_mm, 0.02);
+  double worst = 0;
+  for (std::size_t k = 0; k < before[0].line_mm.size(); ++k)
+    worst = std::max(worst, std::abs(after[0].line_mm[k].z() - before[0].line_mm[k].z()));
+  EXPECT_NEAR(welded[0].height_error_mm, worst, 0.02);
 }
 
 TEST(PlcWorker, LeadsAJobToItsEnd) {
