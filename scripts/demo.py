@@ -13,7 +13,7 @@ import time
 
 TOP = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 CONFIG = os.path.join(TOP, "config")
-PORTS = {"egm": 6511, "rws": 8080, "laser": 10240, "modbus": 1502}
+PORTS = {"egm": 6511, "rws": 8080, "laser": 10240, "laser_commands": 10241, "modbus": 1502}
 CAD = {"ladder": "ladder", "mitre": "mitre"}
 # The laser section's lines for each dialect, and readings a second as such a sensor gives.
 LASERS = {
@@ -36,7 +36,7 @@ def parse(arguments=None):
     parser.add_argument("--seeds", type=int, default=1, help="how many jobs, each with its own placement within +-15 mm, +-20 deg")
     parser.add_argument("--seed", type=int, default=1, help="the first seed")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout, nothing else")
-    parser.add_argument("--free-ports", action="store_true", help="take free ports instead of 6511, 8080, 10240 and 1502")
+    parser.add_argument("--free-ports", action="store_true", help="take free ports instead of 6511, 8080, 10240, 10241 and 1502")
     parser.add_argument("--keep", action="store_true", help="leave simulator and daemon running")
     parser.add_argument("--dir", help="working directory (default: a new one, printed)")
     parser.add_argument("--fault", action="append", default=[], help="handed to weldcell-sim, e.g. laser_drop@scan+5:2")
@@ -90,6 +90,7 @@ class Demo:
         if self.options.free_ports:
             for name, port in free_ports().items():
                 text = text.replace(f"127.0.0.1:{PORTS[name]}", f"127.0.0.1:{port}")
+                text = text.replace(f"command_port: {PORTS[name]}\n", f"command_port: {port}\n")
         if self.options.rws == 2:
             text = self.with_generation_two(text)
         text = self.with_laser(text)
@@ -116,6 +117,8 @@ class Demo:
     def with_laser(self, text):
         """The laser section for the dialect asked for."""
         lines, rate_hz = LASERS[self.options.laser]
+        if self.options.laser in ("two_byte", "three_byte", "od5000"):  # commands go to where the readings come from
+            text = re.sub(r"^  command_port:.*\n", "", text, flags=re.M)
         for old, new in (("  dialect: meas28\n", f"  dialect: {self.options.laser}\n"), ("  frame: [counter, timestamp]\n", lines),
                          ("  rate_hz: 5000\n", f"  rate_hz: {rate_hz}\n")):
             if old not in text:

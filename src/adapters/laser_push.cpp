@@ -5,20 +5,19 @@
 
 #include <array>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
-#include <vector>
 
 #include "socket_stamp.hpp"
 #include "weldcell/adapters/host_clock.hpp"
+#include "weldcell/adapters/laser_commands.hpp"
 
 namespace weldcell::adapters {
 namespace {
 
-// OD5000, operating instructions 8021391: writing (table 30), data push (table 46).
-constexpr std::uint32_t kPushPort = 0x10E2, kPushIp = 0x10E4, kPushChannels = 0x01E0;
 constexpr Nanoseconds kSilence = kSecond;
 constexpr int kTries = 3;
+// Data push channel selection, 0: stop. OD5000, operating instructions 8021391, tables 30 and 46.
+constexpr std::array<unsigned char, 10> kStop{0x40, 0x02, 0x01, 0xE0, 0x00, 0x04, 0, 0, 0, 0};
 
 Error fault(const char* code, const std::string& where, const std::string& what, const char* mend) {
   return {code, "laser " + where, what, mend};
@@ -31,21 +30,10 @@ bool read_address(const std::string& host, int port, int least_port, sockaddr_in
   return port >= least_port && port <= 65535 && ::inet_pton(AF_INET, host.c_str(), &out.sin_addr) == 1;
 }
 
-/// 0x4002, command, length, value: big end first.
-std::vector<std::byte> write_request(std::uint32_t command, std::uint32_t value, std::uint32_t bytes) {
-  std::vector<std::byte> out;
-  for (const std::uint32_t word : {0x4002U, command, bytes}) {
-    out.push_back(static_cast<std::byte>(word >> 8));
-    out.push_back(static_cast<std::byte>(word & 0xFF));
-  }
-  for (std::uint32_t i = bytes; i-- > 0;) out.push_back(static_cast<std::byte>(value >> 8 * i & 0xFF));
-  return out;
-}
-
 }  // namespace
 
 Result<LaserPush> LaserPush::start(const std::string& sensor, int command_port, const std::string& host,
-                                   int port, std::size_t channels, Nanoseconds timeout) {
+                                   int port, const wire::LaserFormat& format, Nanoseconds timeout) {
   LaserPush out;
   out.peer_ = sensor + ":" + std::to_string(command_port);
   sockaddr_in peer{}, local{};
@@ -79,48 +67,22 @@ Result<LaserPush> LaserPush::start(const std::string& sensor, int command_port, 
   }
   // Listening everywhere, the address that leads to the sensor is the one that it can reach.
   const in_addr target = local.sin_addr.s_addr == htonl(INADDR_ANY) ? self.sin_addr : local.sin_addr;
-  const std::array<std::array<std::uint32_t, 3>, 4> settings{
-      {{kPushChannels, 0, 4},
-       {kPushIp, ntohl(target.s_addr), 4},
-       {kPushPort, static_cast<std::uint32_t>(out.port_), 2},
-       {kPushChannels, (1U << channels) - 1, 4}}};
-  for (const auto& [command, value, bytes] : settings) {
-    if (const Status written = out.write(command, value, bytes, timeout); !written.ok())
-      return written.error();
-  }
+  wire::LaserWanted wanted;
+  wanted.format = format;
+  wanted.device = "laser " + out.peer_;
+  wanted.push_ip = ntohl(target.s_addr);
+  wanted.push_port = out.port_;
+  const auto setup = wire::laser_setup(wanted);
+  auto notes = talk_to_laser(out.command_.get(), wanted.device, *setup, {timeout, kTries, {}});
+  if (!notes.ok()) return notes.error();
+  out.notes_ = std::move(*notes);
   out.heard_ = now();
   return out;
 }
 
 LaserPush::~LaserPush() {
   if (!command_.valid()) return;
-  const auto stop = write_request(kPushChannels, 0, 4);
-  if (::send(command_.get(), stop.data(), stop.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) return;
-}
-
-Status LaserPush::write(std::uint32_t command, std::uint32_t value, std::uint32_t bytes,
-                        Nanoseconds timeout) const {
-  const auto request = write_request(command, value, bytes);
-  std::array<std::byte, 64> reply{};
-  for (int i = 0; i < kTries; ++i) {
-    if (::send(command_.get(), request.data(), request.size(), MSG_NOSIGNAL) < 0 && errno == ECONNREFUSED)
-      return fault("laser.refused", peer_, "the host is there, but nothing listens on this port",
-                   "correct the port in laser.address: the sensor takes commands at 5011");
-    const HostTime deadline = now() + timeout;
-    while (wait_readable(command_.get(), deadline)) {
-      const ssize_t n = ::recv(command_.get(), reply.data(), reply.size(), 0);
-      if (n < 0 && errno == ECONNREFUSED)
-        return fault("laser.refused", peer_, "the host is there, but nothing listens on this port",
-                     "correct the port in laser.address: the sensor takes commands at 5011");
-      if (n < 2 || reply[0] >> 4 != std::byte{0xC}) continue;
-      if (n == 2 && reply[0] == std::byte{0xC0} && reply[1] == std::byte{0}) return Done{};
-      char name[64];
-      std::snprintf(name, sizeof name, "the sensor refused command 0x%04X", command);
-      return fault("laser.refused", peer_, name,
-                   "is it an OD5000 or CDX with data push (firmware from 2017)?");
-    }
-  }
-  return fault("laser.timeout", peer_, "no answer to a command", "check cable, power and laser.address");
+  if (::send(command_.get(), kStop.data(), kStop.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) return;
 }
 
 LaserArrival LaserPush::receive(std::span<std::byte> buffer, Nanoseconds timeout) noexcept {

@@ -4,13 +4,9 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <filesystem>
 #include <optional>
-#include <thread>
 
 #include "weldcell/adapters/host_clock.hpp"
-#include "weldcell/adapters/laser_push.hpp"
-#include "weldcell/adapters/laser_tcp.hpp"
 #include "weldcell/adapters/projector_png.hpp"
 #include "weldcell/adapters/projector_window.hpp"
 
@@ -56,63 +52,6 @@ void run_egm(Wiring& wiring, adapters::EgmSocket& socket) {
     if (size > 0) socket.reply(std::span(item.reply).first(size));
     item.report = wiring.session.report();
     wiring.egm.push(item);
-  }
-}
-
-namespace {
-
-/// Bytes to the cell while the link stands.
-template <typename Link>
-void pump(Wiring& wiring, Link& link) {
-  LaserItem item;
-  while (!stopping(wiring)) {
-    const adapters::LaserArrival got = link.receive(item.bytes, kPoll);
-    wiring.beat(ThreadName::Laser);
-    if (got.event == adapters::LinkEvent::Timeout) continue;
-    if (got.event != adapters::LinkEvent::Data) return;
-    if (!wiring.wants_laser.load(std::memory_order_relaxed)) continue;
-    item.arrival = got.arrival;
-    item.size = static_cast<std::uint16_t>(got.bytes);
-    wiring.laser.push(item);
-  }
-}
-
-template <typename Connect>
-void keep_connected(Wiring& wiring, Connect connect) {
-  const files::Endpoint& address = wiring.config.laser;
-  bool told_absent = false;
-  std::optional<HostTime> lost_at;
-  while (!stopping(wiring)) {
-    auto link = connect();
-    wiring.beat(ThreadName::Laser);
-    if (!link.ok()) {
-      if (!told_absent) spdlog::warn("laser: {}; trying again", link.error().text());
-      told_absent = true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(500));
-      continue;
-    }
-    told_absent = false;
-    std::string detail = fmt::format("{}:{}", address.host, address.port);
-    if (lost_at) detail += fmt::format(", after {:.1f} s without it", seconds(adapters::now() - *lost_at));
-    report_link(wiring, job::Link::Laser, true, detail);
-    pump(wiring, *link);
-    lost_at = adapters::now();
-    if (!stopping(wiring)) report_link(wiring, job::Link::Laser, false, link->reason());
-  }
-}
-
-}  // namespace
-
-void run_laser(Wiring& wiring) {
-  const files::CellConfig& c = wiring.config;
-  if (c.laser_format.dialect == wire::LaserDialect::Od5000) {
-    keep_connected(wiring, [&c] {
-      return adapters::LaserPush::start(c.laser.host, c.laser.port, c.laser_listen.host, c.laser_listen.port,
-                                        c.laser_format.words, 300 * kMillisecond);
-    });
-  } else {
-    keep_connected(wiring,
-                   [&c] { return adapters::LaserSocket::connect(c.laser.host, c.laser.port, kSecond); });
   }
 }
 

@@ -128,8 +128,8 @@ std::variant<CellConfig, Faults> read_cell_file(const std::string& path, StaleLa
   const fs::path folder = fs::absolute(path).parent_path();
   auto parsed = parse_cell(std::get<std::string>(text), path, (folder / "robots").string(), stale);
   if (auto* config = std::get_if<CellConfig>(&parsed)) {
-    for (std::string* named :
-         {&config->spool_dir, &config->state_dir, &config->cad_cache_dir, &config->rws_password_file}) {
+    for (std::string* named : {&config->spool_dir, &config->state_dir, &config->cad_cache_dir,
+                               &config->rws_password_file, &config->laser_password_file}) {
       if (!named->empty()) *named = (folder / *named).lexically_normal().string();
     }
   }

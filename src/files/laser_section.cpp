@@ -1,6 +1,7 @@
 // The laser section of a cell file: geometry and noise, and what its wire carries.
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cmath>
 
 #include "files/cell_sections.hpp"
@@ -103,6 +104,40 @@ void read_wire(Map& map, CellConfig& config) {
   }
 }
 
+/// Where the sensor's commands are taken: every dialect has a usual place, `none` says that there is none.
+void read_commands(Map& map, CellConfig& config) {
+  const LaserDialect dialect = config.laser_format.dialect;
+  const bool pushed = dialect == LaserDialect::Od5000;
+  config.laser_commands = is_bytes(dialect) ? LaserCommands::InStream
+                          : pushed          ? LaserCommands::None
+                                            : LaserCommands::Port;
+  const bool logs_in = dialect == LaserDialect::Meas28 || dialect == LaserDialect::Data28 ||
+                       dialect == LaserDialect::ThreeByte;
+  if (map.text("password_file", config.laser_password_file) && !logs_in)
+    map.fault("password_file", "stands beside a dialect whose sensors know no login", "leave it out");
+  std::string word;
+  if (!map.text("command_port", word)) return;
+  if (pushed) {
+    map.fault("command_port", "stands beside dialect od5000, whose address is its command port",
+              "leave it out");
+    return;
+  }
+  if (word == "none") {
+    config.laser_commands = LaserCommands::None;
+    return;
+  }
+  int port = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), port);
+  const bool number = error == std::errc{} && end == word.data() + word.size() && port >= 0 && port <= 65535;
+  if (is_bytes(dialect) ? word == "in_stream" : number) {
+    config.laser_command_port = port;
+    return;
+  }
+  map.fault("command_port", "'" + word + "' is no way to this sensor's commands",
+            is_bytes(dialect) ? "in_stream, where the device server passes bytes on to the sensor, or none"
+                              : "its TCP port, usually 23, or none where it cannot be reached");
+}
+
 void read_latency_conditions(Map& map, CellConfig& config) {
   const Node* node = map.node("latency_measured");
   if (node == nullptr) return;
@@ -124,6 +159,7 @@ void read_laser(Map& map, CellConfig& config) {
   const std::size_t faults_before = map.faults().size();
   cell::LaserSetup& laser = config.setup.laser;
   read_wire(map, config);
+  read_commands(map, config);
   read_mount_of(map, laser.T_flange_laser);
   map.number("start_of_range_mm", laser.start_of_range_mm, {0, 5000});
   map.number("range_mm", laser.range_mm, {1, 5000});

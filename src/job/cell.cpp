@@ -186,6 +186,7 @@ void Cell::on(const LaserBytes& bytes) {
 
 void Cell::on(const LinkChange& change) {
   bool& up = status_.links[static_cast<std::size_t>(change.link)];
+  if (change.link == Link::Laser) laser_trouble_ = change.up ? std::string() : change.detail;
   if (up == change.up) return;
   up = change.up;
   log(up ? LogEvent::Level::Info : LogEvent::Level::Warning,

@@ -423,7 +423,9 @@ Cell::Answer Cell::start_hindrance() const {
   const auto down = [&](Link link) { return !status_.links[static_cast<std::size_t>(link)]; };
   if (!status_.armed) return {PlcResult::NotArmed, "not armed: a person must arm the cell first"};
   if (down(Link::Rws)) return {PlcResult::LinkMissing, "the robot controller is not reachable"};
-  if (down(Link::Laser)) return {PlcResult::LinkMissing, "the laser is not connected"};
+  if (down(Link::Laser))
+    return {PlcResult::LinkMissing,
+            "the laser is not connected" + (laser_trouble_.empty() ? "" : ": " + laser_trouble_)};
   if (plc_required_ && down(Link::Plc)) return {PlcResult::LinkMissing, "the PLC's heartbeat is missing"};
   return {};
 }

@@ -14,6 +14,9 @@ namespace {
 
 // Commands of the OD5000, operating instructions 8021391, tables 26 to 31 and 46.
 constexpr std::uint32_t kPushPort = 0x10E2, kPushIp = 0x10E4, kPushChannels = 0x01E0, kFirmware = 0x0004;
+// Sampling rate (7.4.1), filters and hold of channels A to D, 0x80 apart (table 32 of 2017).
+constexpr std::uint32_t kSamplingRate = 0x0C10, k100us = 3, kAnotherRate = 4;
+constexpr std::uint32_t kMedian = 0x0210, kMovingAverage = 0x0214, kHold = 0x022C, kPerChannel = 0x80;
 constexpr std::uint32_t kUnknownCommand = 0xE1;
 
 std::uint32_t number(std::span<const std::byte> bytes) {
@@ -35,7 +38,9 @@ int udp_socket() {
 
 }  // namespace
 
-LaserPushServer::LaserPushServer(const files::Endpoint& control) {
+LaserPushServer::LaserPushServer(const files::CellConfig& cell)
+    : sampling_rate_(cell.setup.laser.rate_hz == 10'000 ? k100us : kAnotherRate) {
+  const files::Endpoint& control = cell.laser;
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(control.port));
@@ -65,6 +70,12 @@ std::uint32_t* LaserPushServer::setting(std::uint32_t command) {
   if (command == kPushPort) return &target_port_;
   if (command == kPushIp) return &target_ip_;
   if (command == kPushChannels) return &channels_;
+  if (command == kSamplingRate) return &sampling_rate_;
+  for (std::uint32_t i = 0; i < filters_.size(); ++i) {
+    if (command == kMedian + i * kPerChannel) return &filters_[i].median;
+    if (command == kMovingAverage + i * kPerChannel) return &filters_[i].moving_average;
+    if (command == kHold + i * kPerChannel) return &filters_[i].hold;
+  }
   return nullptr;
 }
 

@@ -2,6 +2,7 @@
 // thread; never blocks.
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "sim/laser_server.hpp"
@@ -11,12 +12,13 @@ namespace weldcell::sim {
 class LaserPushServer final : public LaserOutlet {
  public:
   /// The command port is open at once. Throws std::system_error when the address cannot be bound.
-  explicit LaserPushServer(const files::Endpoint& control);
+  explicit LaserPushServer(const files::CellConfig& cell);
   ~LaserPushServer() override;
   LaserPushServer(const LaserPushServer&) = delete;
   LaserPushServer& operator=(const LaserPushServer&) = delete;
 
   int port() const override { return port_; }
+  int command_port() const override { return port_; }
   /// Answers the commands that have come.
   void serve() override;
   void send_due(std::deque<LaserBlock>& blocks, HostTime now) override;
@@ -30,6 +32,11 @@ class LaserPushServer final : public LaserOutlet {
   int control_ = -1, data_ = -1;
   int port_ = 0;
   std::uint32_t channels_ = 0, target_port_ = 0, target_ip_ = 0, firmware_ = 0x00030008;
+  std::uint32_t sampling_rate_;
+  struct Channel {
+    std::uint32_t median = 0, moving_average = 1, hold = 0;
+  };
+  std::array<Channel, 4> filters_;
 };
 
 }  // namespace weldcell::sim

@@ -44,9 +44,8 @@ RwsServerOptions rws_options(const Scene& scene, const LiveOptions& options) {
 }
 
 std::unique_ptr<LaserOutlet> laser_outlet(const files::CellConfig& cell) {
-  if (cell.laser_format.dialect == wire::LaserDialect::Od5000)
-    return std::make_unique<LaserPushServer>(cell.laser);
-  return std::make_unique<LaserServer>(cell.laser);
+  if (cell.laser_format.dialect == wire::LaserDialect::Od5000) return std::make_unique<LaserPushServer>(cell);
+  return std::make_unique<LaserServer>(cell);
 }
 
 }  // namespace
@@ -70,6 +69,7 @@ std::string LiveCell::ports_json() const {
   const nlohmann::ordered_json out{{"egm", scene_.cell.egm.port},
                                    {"rws", rws_.port()},
                                    {"laser", laser_outlet_->port()},
+                                   {"laser_commands", laser_outlet_->command_port()},
                                    {"modbus", scene_.cell.modbus.port},
                                    {"rws_generation", controller_.rws_generation()},
                                    {"rws_certificate_sha256", rws_.fingerprint()}};

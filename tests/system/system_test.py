@@ -4,6 +4,7 @@ import json
 import math
 import os
 import random
+import re
 import socket
 import subprocess
 import sys
@@ -249,6 +250,50 @@ def wrong_certificate(bin_dir):
             time.sleep(0.1)
         check("certificate_sha256" in open(log).read(), f"no mend: {open(log).read()}")
         check(not demo.ask_status()["links"]["robot controller"], "it talks to a stranger")
+    finally:
+        demo.end(demo.daemon)
+        demo.end(demo.sim)
+
+
+def laser_set_otherwise(bin_dir):
+    """The sensor's own rate and frame are not the cell file's: told over its command port with both values; nothing starts."""
+    demo = make(bin_dir)
+    try:
+        demo.start_sim(6)
+        with open(demo.cell) as f:
+            told = f.read()
+        begin = time.monotonic()
+        while '"laser_commands"' not in open(os.path.join(demo.dir, "weldcell-sim.log")).read():
+            check(time.monotonic() - begin < 20, "the simulator does not start")
+            time.sleep(0.1)
+        with open(demo.cell, "w") as f:
+            f.write(told.replace("rate_hz: 5000", "rate_hz: 2500").replace("frame: [counter, timestamp]", "frame: [counter, timestamp, status]"))
+        demo.start_daemon()
+        demo.submit(6)
+        wait_state(demo, ["Ready"], 60)
+        log = os.path.join(demo.dir, "weldcelld.log")
+        begin = time.monotonic()
+        while "laser.rate_hz" not in open(log).read():
+            check(time.monotonic() - begin < 20, f"it does not say why: {open(log).read()}")
+            time.sleep(0.1)
+        while not demo.ask_status()["links"]["robot controller"]:
+            check(time.monotonic() - begin < 20, "no robot")
+            time.sleep(0.1)
+        operate(demo, "arm")
+        answer = operate(demo, "start", expect=1)
+        for words in ("ILD2300", "laser.rate_hz is 2500, the sensor has 5000 Hz",
+                      "laser.frame is [counter, timestamp, distance, status], the sensor has [counter, timestamp, distance]"):
+            check(words in answer and words in open(log).read(), f"'{words}' is not in: {answer}")
+        check(not demo.ask_status()["links"]["laser"], "it took the sensor")
+        demo.end(demo.daemon)
+        with open(demo.cell, "w") as f:
+            f.write(re.sub("command_port: [0-9]+", "command_port: none", told))
+        demo.start_daemon()
+        begin = time.monotonic()
+        while not demo.ask_status()["links"]["laser"]:
+            check(time.monotonic() - begin < 20, "no laser without a command port")
+            time.sleep(0.1)
+        check("laser.command_port: none" in open(log).read(), "that nothing was checked is not told")
     finally:
         demo.end(demo.daemon)
         demo.end(demo.sim)

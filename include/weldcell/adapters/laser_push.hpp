@@ -2,17 +2,21 @@
 // port where to send. Owned by the laser thread; receive() is real-time safe.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "weldcell/adapters/laser_tcp.hpp"
+#include "weldcell/wire/laser_dialects.hpp"
 
 namespace weldcell::adapters {
 
 class LaserPush {
  public:
-  /// Listens at host:port (port 0 takes a free one), writes this address and the channels into the sensor and
-  /// starts it. `channels`: how many, A first. Waits `timeout` for each answer and asks three times. Errors:
-  /// "laser.address", "laser.listen", "laser.timeout", "laser.refused".
+  /// Listens at host:port (port 0 takes a free one), switches filters and hold of the distance's channel off,
+  /// writes this address and the channels into the sensor and starts it. Waits `timeout` for each answer and
+  /// asks three times. Errors: "laser.address", "laser.listen" and those of talk_to_laser().
   static Result<LaserPush> start(const std::string& sensor, int command_port, const std::string& host,
-                                 int port, std::size_t channels, Nanoseconds timeout);
+                                 int port, const wire::LaserFormat& format, Nanoseconds timeout);
   LaserPush(LaserPush&&) = default;
   LaserPush& operator=(LaserPush&&) = default;
   /// Tells the sensor to stop; it does not say whether it did.
@@ -23,11 +27,12 @@ class LaserPush {
   LaserArrival receive(std::span<std::byte> buffer, Nanoseconds timeout) noexcept;
   std::string reason() const;
   int port() const noexcept { return port_; }
+  /// What was switched in the sensor at the start, and what it could not be asked.
+  const std::vector<std::string>& notes() const noexcept { return notes_; }
   std::uint64_t foreign() const noexcept { return foreign_; }  ///< datagrams from elsewhere, left out
 
  private:
   LaserPush() = default;
-  Status write(std::uint32_t command, std::uint32_t value, std::uint32_t bytes, Nanoseconds timeout) const;
 
   Fd data_, command_;
   std::string peer_;
@@ -36,6 +41,7 @@ class LaserPush {
   bool closed_ = false;
   std::uint64_t foreign_ = 0;
   HostTime heard_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace weldcell::adapters

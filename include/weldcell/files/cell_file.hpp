@@ -27,6 +27,10 @@ struct LatencyConditions {
   std::string date;  ///< UTC, of the calibration
 };
 
+/// How the laser's commands are reached: not at all (od5000: at its address), over a TCP port beside the
+/// readings', or in their stream.
+enum class LaserCommands { None, Port, InStream };
+
 enum class RealTime { Off, Try, Required };
 /// Auto: found out from the controller's first answer.
 enum class RwsGenerationChoice { One, Two, Auto };
@@ -48,7 +52,10 @@ struct CellConfig {
   Endpoint laser{"127.0.0.1", 10240};     ///< the sensor; its command port with the dialect od5000
   Endpoint laser_listen{"127.0.0.1", 0};  ///< UDP, we listen: od5000 only
   wire::LaserFormat laser_format;         ///< without a fault
-  std::string laser_filter = "none";      ///< the sensor's own averaging or median; part of its latency
+  LaserCommands laser_commands = LaserCommands::Port;
+  int laser_command_port = 23;        ///< TCP at the laser's address; LaserCommands::Port only
+  std::string laser_password_file;    ///< for a sensor that wants a LOGIN; "" = as delivered
+  std::string laser_filter = "none";  ///< the sensor's own averaging or median; part of its latency
   /// Under which the latency was measured; nothing when it was not.
   std::optional<LatencyConditions> latency_measured;
   Endpoint modbus{"127.0.0.1", 1502};     ///< we listen

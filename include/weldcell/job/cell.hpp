@@ -331,6 +331,7 @@ class Cell {
   bool cleared_ = false;           ///< a person has acknowledged the fault or the interruption
   bool watches_latency_ = false, latency_drifted_ = false;
   double latency_drift_ms_ = 0;
+  std::string laser_trouble_;  ///< why the laser is not connected; "" while it is, or was never tried
   int latency_jobs_ = 0;
 };
 

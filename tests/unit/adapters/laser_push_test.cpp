@@ -15,7 +15,17 @@
 namespace weldcell::adapters {
 namespace {
 
-/// Answers a number of commands as it is told to, on a thread of its own.
+/// A sensor of so many channels at 10 kHz, no filter on.
+wire::LaserFormat format(std::size_t channels) {
+  wire::LaserFormat out;
+  out.dialect = wire::LaserDialect::Od5000;
+  out.rate_hz = 10'000;
+  out.words = channels;
+  return out;
+}
+
+/// Answers a number of commands on a thread of its own: a write with `reply`, a read with the setting that is
+/// wanted.
 class Sensor {
  public:
   explicit Sensor(std::string reply, int commands) : socket_(::socket(AF_INET, SOCK_DGRAM, 0)) {
@@ -37,7 +47,14 @@ class Sensor {
                                        reinterpret_cast<sockaddr*>(&from), &size);
         if (got < 0) return;
         heard_.emplace_back(buffer.data(), static_cast<std::size_t>(got));
-        ::sendto(socket_.get(), reply.data(), reply.size(), 0, reinterpret_cast<sockaddr*>(&from), size);
+        std::string answer = reply;
+        if (heard_.back()[0] == '\x30') {
+          const char value = heard_.back()[3] == '\x10' && heard_.back()[2] == '\x0C' ? '\x03'
+                             : heard_.back()[3] == '\x14'                             ? '\x01'
+                                                                                      : '\x00';
+          answer = std::string("\xB0\x04\x00\x00\x00", 5) + value;
+        }
+        ::sendto(socket_.get(), answer.data(), answer.size(), 0, reinterpret_cast<sockaddr*>(&from), size);
       }
     });
   }
@@ -69,16 +86,18 @@ class Sensor {
 const std::string kDone("\xC0\x00", 2);
 
 TEST(LaserPush, WritesAddressPortAndChannelsThenReceives) {
-  Sensor sensor(kDone, 4);
-  auto link = LaserPush::start("127.0.0.1", sensor.port(), "127.0.0.1", 0, 2, kSecond);
+  Sensor sensor(kDone, 8);
+  auto link = LaserPush::start("127.0.0.1", sensor.port(), "127.0.0.1", 0, format(2), kSecond);
   ASSERT_TRUE(link.ok()) << link.error().text();
   const auto& heard = sensor.heard();
-  ASSERT_EQ(heard.size(), 4U);
+  ASSERT_EQ(heard.size(), 8U);
+  EXPECT_TRUE(link->notes().empty());
   EXPECT_EQ(heard[0], std::string("\x40\x02\x01\xE0\x00\x04\x00\x00\x00\x00", 10));
-  EXPECT_EQ(heard[1], std::string("\x40\x02\x10\xE4\x00\x04\x7F\x00\x00\x01", 10));
+  EXPECT_EQ(heard[1], std::string("\x30\x02\x0C\x10", 4));
+  EXPECT_EQ(heard[5], std::string("\x40\x02\x10\xE4\x00\x04\x7F\x00\x00\x01", 10));
   const std::string port{static_cast<char>(link->port() >> 8), static_cast<char>(link->port() & 0xFF)};
-  EXPECT_EQ(heard[2], std::string("\x40\x02\x10\xE2\x00\x02", 6) + port);
-  EXPECT_EQ(heard[3], std::string("\x40\x02\x01\xE0\x00\x04\x00\x00\x00\x03", 10));
+  EXPECT_EQ(heard[6], std::string("\x40\x02\x10\xE2\x00\x02", 6) + port);
+  EXPECT_EQ(heard[7], std::string("\x40\x02\x01\xE0\x00\x04\x00\x00\x00\x03", 10));
 
   std::array<std::byte, 64> buffer{};
   EXPECT_EQ(link->receive(buffer, 10 * kMillisecond).event, LinkEvent::Timeout);
@@ -96,23 +115,26 @@ TEST(LaserPush, WritesAddressPortAndChannelsThenReceives) {
 
 TEST(LaserPush, SaysWhatTheSensorDidNotDo) {
   Sensor refusing(std::string("\xC0\x02\x00\xE1", 4), 1);
-  const auto refused = LaserPush::start("127.0.0.1", refusing.port(), "127.0.0.1", 0, 1, kSecond);
+  const auto refused = LaserPush::start("127.0.0.1", refusing.port(), "127.0.0.1", 0, format(1), kSecond);
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, "laser.refused");
   EXPECT_NE(refused.error().text().find("0x01E0"), std::string::npos);
 
   int closed_port = 0;
   { closed_port = Sensor(kDone, 0).port(); }
-  EXPECT_EQ(LaserPush::start("127.0.0.1", closed_port, "127.0.0.1", 0, 1, 50 * kMillisecond).error().code,
-            "laser.refused");
-  EXPECT_EQ(LaserPush::start("sensor", 5011, "127.0.0.1", 0, 1, kSecond).error().code, "laser.address");
-  EXPECT_EQ(LaserPush::start("127.0.0.1", 5011, "here", 0, 1, kSecond).error().code, "laser.address");
-  EXPECT_EQ(LaserPush::start("127.0.0.1", 5011, "192.0.2.1", 0, 1, kSecond).error().code, "laser.listen");
+  EXPECT_EQ(
+      LaserPush::start("127.0.0.1", closed_port, "127.0.0.1", 0, format(1), 50 * kMillisecond).error().code,
+      "laser.refused");
+  EXPECT_EQ(LaserPush::start("sensor", 5011, "127.0.0.1", 0, format(1), kSecond).error().code,
+            "laser.address");
+  EXPECT_EQ(LaserPush::start("127.0.0.1", 5011, "here", 0, format(1), kSecond).error().code, "laser.address");
+  EXPECT_EQ(LaserPush::start("127.0.0.1", 5011, "192.0.2.1", 0, format(1), kSecond).error().code,
+            "laser.listen");
 }
 
 TEST(LaserPush, ASecondWithoutReadingsIsALoss) {
-  Sensor sensor(kDone, 4);
-  auto link = LaserPush::start("127.0.0.1", sensor.port(), "127.0.0.1", 0, 1, kSecond);
+  Sensor sensor(kDone, 8);
+  auto link = LaserPush::start("127.0.0.1", sensor.port(), "127.0.0.1", 0, format(1), kSecond);
   ASSERT_TRUE(link.ok());
   std::array<std::byte, 64> buffer{};
   EXPECT_EQ(link->reason(), "");

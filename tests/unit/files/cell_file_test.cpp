@@ -88,7 +88,7 @@ TEST(CellFile, NamesEveryFaultWithItsLine) {
   EXPECT_THAT(found, HasSubstr("laser.rate_hz: 120000 is out of range: 50 to 70000"));
   EXPECT_THAT(found, HasSubstr("laser.latency: unknown key: did you mean 'latency_ms'?"));
   EXPECT_THAT(found, HasSubstr("laser.latency_ms: '.nan' is not finite"));
-  EXPECT_THAT(found, HasSubstr("cell.yaml:31: laser.rate_hz"));
+  EXPECT_THAT(found, HasSubstr("cell.yaml:32: laser.rate_hz"));
 }
 
 TEST(CellFile, RefusesAPasswordInTheFile) {
@@ -174,12 +174,13 @@ TEST(CellFile, ReadsEveryLaserDialect) {
     EXPECT_TRUE(std::holds_alternative<CellConfig>(read)) << text(std::get<Faults>(read));
     return std::get<CellConfig>(read).laser_format;
   };
-  const std::string old_frame = "  frame: [counter, timestamp]\n";
+  const std::string old_frame = "  frame: [counter, timestamp]\n", command_port = "  command_port: 10241\n";
   EXPECT_EQ(format_of("").dialect, wire::LaserDialect::Meas28);
   EXPECT_EQ(format_of("  dialect: meas28\n").dialect, wire::LaserDialect::Meas28);
   const auto with = [&](const std::string& lines) {
     std::string cell = demo_with("  dialect: meas28\n", lines);
     cell.erase(cell.find(old_frame), old_frame.size());
+    cell.erase(cell.find(command_port), command_port.size());
     const auto read = parse_cell(cell, "cell.yaml", kConfig + "/robots");
     EXPECT_TRUE(std::holds_alternative<CellConfig>(read)) << text(std::get<Faults>(read));
     return std::get<CellConfig>(read).laser_format;
@@ -203,6 +204,41 @@ TEST(CellFile, ReadsEveryLaserDialect) {
     EXPECT_DOUBLE_EQ(f.rate_hz, 5000);
     EXPECT_EQ(wire::laser_format_fault(f), nullptr);
   }
+}
+
+TEST(CellFile, WhereTheLasersCommandsAreTaken) {
+  const auto read = [](const std::string& dialect, const std::string& frame, const std::string& port) {
+    std::string cell = demo_with("  dialect: meas28\n", "  dialect: " + dialect + "\n");
+    for (const auto& [old, now] : {std::pair{std::string("  frame: [counter, timestamp]\n"), frame},
+                                   {std::string("  command_port: 10241\n"), port}})
+      cell.replace(cell.find(old), old.size(), now);
+    return parse_cell(cell, "cell.yaml", kConfig + "/robots");
+  };
+  const auto config = [&](const std::string& dialect, const std::string& frame, const std::string& port) {
+    const auto got = read(dialect, frame, port);
+    EXPECT_TRUE(std::holds_alternative<CellConfig>(got)) << text(std::get<Faults>(got));
+    return std::get<CellConfig>(got);
+  };
+  EXPECT_EQ(config("meas28", "", "").laser_command_port, 23);
+  EXPECT_EQ(config("meas28", "", "").laser_commands, LaserCommands::Port);
+  EXPECT_EQ(config("data28", "", "  command_port: 2300\n").laser_command_port, 2300);
+  EXPECT_EQ(config("meas28", "", "  command_port: none\n").laser_commands, LaserCommands::None);
+  EXPECT_EQ(config("two_byte", "", "").laser_commands, LaserCommands::InStream);
+  EXPECT_EQ(config("three_byte", "", "  command_port: none\n").laser_commands, LaserCommands::None);
+  EXPECT_EQ(config("three_byte", "", "  command_port: in_stream\n").laser_commands, LaserCommands::InStream);
+  EXPECT_FALSE(config("three_byte", "", "  password_file: laser-password\n").laser_password_file.empty());
+
+  const auto fault = [&](const std::string& dialect, const std::string& frame, const std::string& port) {
+    const auto got = read(dialect, frame, port);
+    EXPECT_TRUE(std::holds_alternative<Faults>(got));
+    return std::holds_alternative<Faults>(got) ? text(std::get<Faults>(got)) : std::string();
+  };
+  EXPECT_THAT(fault("meas28", "", "  command_port: in_stream\n"), HasSubstr("usually 23, or none"));
+  EXPECT_THAT(fault("meas28", "", "  command_port: 70000\n"), HasSubstr("'70000' is no way"));
+  EXPECT_THAT(fault("two_byte", "", "  command_port: 23\n"), HasSubstr("in_stream, where the device server"));
+  EXPECT_THAT(fault("two_byte", "", "  password_file: x\n"), HasSubstr("know no login"));
+  EXPECT_THAT(fault("od5000", "  listen: 127.0.0.1:0\n", "  command_port: none\n"),
+              HasSubstr("address is its command port"));
 }
 
 }  // namespace
