@@ -18,6 +18,7 @@ struct Row {
   double reference = NAN;  ///< NAN: none
   double target = NAN;     ///< NAN: shown beside, not judged
   Better better = Better::Lower;
+  double standard_error = NAN;  ///< of the value, where it is a mean over seeded trials; NAN: not stated
   bool met() const {
     if (std::isnan(target) || better == Better::None) return true;
     return better == Better::Lower ? value <= target : value >= target;
@@ -37,9 +38,9 @@ inline void print_json(std::FILE* out, const std::string& bench, const std::vect
   for (const Row& r : rows) {
     std::fprintf(out,
                  "%s{\"name\": \"%s\", \"value\": %s, \"unit\": \"%s\", \"reference\": %s, \"target\": %s, "
-                 "\"met\": %s}",
+                 "\"standard_error\": %s, \"met\": %s}",
                  comma, r.name.c_str(), number(r.value).c_str(), r.unit.c_str(), number(r.reference).c_str(),
-                 number(r.target).c_str(), r.met() ? "true" : "false");
+                 number(r.target).c_str(), number(r.standard_error).c_str(), r.met() ? "true" : "false");
     comma = ", ";
   }
   std::fprintf(out, "]}\n");
@@ -47,9 +48,11 @@ inline void print_json(std::FILE* out, const std::string& bench, const std::vect
 
 inline void print_table(const std::vector<Row>& rows) {
   for (const Row& r : rows) {
-    std::printf("%-58s %12s %-10s reference %10s  target %10s  %s\n", r.name.c_str(), number(r.value).c_str(),
-                r.unit.c_str(), number(r.reference).c_str(), number(r.target).c_str(),
-                std::isnan(r.target) ? "" : (r.met() ? "met" : "MISSED"));
+    char error[24] = "";
+    if (!std::isnan(r.standard_error)) std::snprintf(error, sizeof error, "+- %.2g", r.standard_error);
+    std::printf("%-58s %12s %-10s %-10s reference %10s  target %10s  %s\n", r.name.c_str(),
+                number(r.value).c_str(), error, r.unit.c_str(), number(r.reference).c_str(),
+                number(r.target).c_str(), std::isnan(r.target) ? "" : (r.met() ? "met" : "MISSED"));
   }
 }
 

@@ -48,13 +48,15 @@ void accuracy_cell(Book& book, const Case& c, const PartUnderTest& part, std::ui
   book.explain(name, t);
   const double target = c.members_off() && part.workpiece.members.size() <= 3 ? 1.25 : c.ratio_target;
   const double paper_ratio = paper.judged > 0 ? paper.ratio() : NAN;
-  book.add(name + " RMS/" + (c.members_off() ? "GLS" : "CRLB"), t.ratio(), "1", paper_ratio, target);
-  book.add(name + " NEES", t.mean_nees(), "1", 1, 1.5);
+  book.add(name + " RMS/" + (c.members_off() ? "GLS" : "CRLB"), t.ratio(), "1", paper_ratio, target,
+           Better::Lower, t.ratio_error());
+  book.add(name + " NEES", t.mean_nees(), "1", 1, 1.5, Better::Lower, t.nees_error());
   book.add(name + " NEES not too small", t.mean_nees(), "1", 1, 0.7, Better::Higher);
   book.add(name + " false accept", t.share(t.false_accept), "%", paper.share(paper.false_accept),
-           c.modelled() ? 0.1 : 1.0);
+           c.modelled() ? 0.1 : 1.0, Better::Lower, t.share_error(t.false_accept));
   if (c.modelled()) {
-    book.add(name + " false reject", t.share(t.false_reject), "%", paper.share(paper.false_reject), 5);
+    book.add(name + " false reject", t.share(t.false_reject), "%", paper.share(paper.false_reject), 5,
+             Better::Lower, t.share_error(t.false_reject));
     book.add(name + " success", t.share(t.success), "%", paper.share(paper.success), 99.5, Better::Higher);
     sums.accepted_wrong += t.false_accept;
     sums.trials += t.trials;

@@ -16,7 +16,7 @@ struct BenchOptions {
   int paper_trials = 12;  ///< the paper's method takes a hundred times longer
   std::uint64_t seed = 90417;
   std::string rows_file;  ///< also write the rows there as JSON, empty: not
-  std::string only;       ///< rows whose name holds this word
+  std::vector<std::string> only;  ///< cells whose name holds one of these words; none: all
 };
 
 class Book {
@@ -34,11 +34,9 @@ class Book {
     for (const PartUnderTest& part : unseen) section(part, options.seed + kUnseenSeeds);
   }
 
-  bool wanted(const std::string& name) const {
-    return options.only.empty() || name.find(options.only) != std::string::npos;
-  }
+  bool wanted(const std::string& name) const;
   void add(const std::string& name, double value, const char* unit, double reference = NAN,
-           double target = NAN, Better better = Better::Lower);
+           double target = NAN, Better better = Better::Lower, double standard_error = NAN);
   /// The trials of a cell that went wrong, for whoever has to find out why; to stderr, not in --json.
   void explain(const std::string& cell, const Tally& tally) const;
 

@@ -18,6 +18,28 @@ PartUnderTest part_under_test(const workpiece::Workpiece& workpiece) {
 
 double Tally::ratio() const { return std::sqrt(ratio_square / (3 * judged)); }
 
+namespace {
+
+/// Standard error of a mean from the sums of its terms and of their squares.
+double error_of_mean(double sum, double squares, int count) {
+  const double mean = sum / count;
+  return std::sqrt(std::max(0.0, squares / count - mean * mean) / count);
+}
+
+}  // namespace
+
+double Tally::ratio_error() const {
+  return error_of_mean(ratio_square, ratio_fourth, judged) / 3 / (2 * ratio());
+}
+
+double Tally::nees_error() const { return error_of_mean(nees, nees_square, judged) / 3; }
+
+double Tally::share_error(int count) const {
+  // Of none or all one more trial might have been the first of its kind.
+  const double share = std::clamp(1.0 * count / trials, 1.0 / (trials + 1), trials / (trials + 1.0));
+  return 100 * std::sqrt(share * (1 - share) / trials);
+}
+
 double Tally::milliseconds(double quantile) const {
   std::vector<double> sorted = ms;
   std::sort(sorted.begin(), sorted.end());
@@ -73,11 +95,13 @@ void judge(const workpiece::OutlineTemplate& outline, const Setting& setting, co
     return;
   }
   const Eigen::Matrix3d limit = bound(outline, setting, set);
-  for (int i = 0; i < 3; ++i) {
-    tally.ratio_square += e(i) * e(i) / limit(i, i);
-    tally.error_square[static_cast<std::size_t>(i)] += e(i) * e(i);
-  }
-  if (found.covariance.trace() > 0) tally.nees += e.dot(found.covariance.ldlt().solve(e));
+  const double square = e.cwiseAbs2().cwiseQuotient(limit.diagonal()).sum();
+  tally.ratio_square += square;
+  tally.ratio_fourth += square * square;
+  for (int i = 0; i < 3; ++i) tally.error_square[static_cast<std::size_t>(i)] += e(i) * e(i);
+  const double nees = found.covariance.trace() > 0 ? e.dot(found.covariance.ldlt().solve(e)) : 0;
+  tally.nees += nees;
+  tally.nees_square += nees * nees;
   if (found.latency_s) tally.latency_square += std::pow(*found.latency_s - setting.latency_s, 2);
   ++tally.judged;
 }

@@ -27,6 +27,7 @@ struct Tally {
   int trials = 0, success = 0, basin = 0, accepted = 0, false_accept = 0, false_reject = 0;
   int judged = 0;  ///< trials inside the basin: only these count below
   double ratio_square = 0, nees = 0, latency_square = 0;
+  double ratio_fourth = 0, nees_square = 0;  ///< sums of squares of the two, for their standard errors
   std::array<double, 3> error_square{};  ///< x, y (mm2) and theta (rad2) at the centroid
   std::vector<double> ms;                ///< CPU time of each trial
   /// Why a good pose was refused or a wrong one accepted: "cause seed".
@@ -35,6 +36,10 @@ struct Tally {
   double ratio() const;
   double mean_nees() const { return nees / (3 * judged); }
   double share(int count) const { return 100.0 * count / trials; }
+  /// Standard errors of the three over the trials.
+  double ratio_error() const;
+  double nees_error() const;
+  double share_error(int count) const;
   double milliseconds(double quantile) const;
 };
 
