@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "alternatives.hpp"
+#include "chance.hpp"
 #include "weldcell/base/units.hpp"
 #include "wording.hpp"
 
@@ -29,9 +30,13 @@ constexpr double kDisplaced_nats = 9;
 constexpr double kDoubtful_nats = 7;
 constexpr double kMinInlierShare = 0.35;
 constexpr double kMinRate = 0.5;
-/// What a pose must be known to (two sigmas) when no weld says so more exactly.
+/// What a pose must be known to when no weld says so more exactly, and how likely it may be farther off:
+/// asked for more, every third part of two members within its tolerance would be refused.
 constexpr double kPoseBound_mm = 1.0;
 constexpr double kPoseBound_rad = rad(0.2);
+constexpr double kMostFartherOff = 0.09;
+/// A pose with a longer tail than this (1 sigma) is not placed, however unlikely the tail.
+constexpr double kMostSigma_mm = 0.75;
 
 void say(Localization& result, Verdict verdict, const char* cause, std::string reason) {
   result.verdict = verdict;
@@ -205,11 +210,10 @@ bool too_vague(const Situation& s, Localization& result) {
   const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(xy).eigenvalues()(1);
   const double sigma_rad = std::sqrt(result.covariance(2, 2));
   // A covariance that rounding has left without a positive determinant proves nothing either.
-  const bool proven = result.covariance.allFinite() &&
+  const bool proven = result.covariance.allFinite() && largest <= kMostSigma_mm * kMostSigma_mm &&
                       Eigen::LLT<Eigen::Matrix3d>(result.covariance).info() == Eigen::Success;
   const double bound_rad = std::max(kPoseBound_rad, 1.0 / std::max(s.outline.radius_mm, 1.0));
-  if (proven && 2 * std::sqrt(std::max(largest, 0.0)) <= kPoseBound_mm && 2.5 * sigma_rad <= bound_rad)
-    return false;
+  if (proven && chance_beyond(s.fit.chances, kPoseBound_mm, bound_rad) <= kMostFartherOff) return false;
   if (const auto& either = s.fit.either) {
     say(result, Verdict::Rescan, "not_enough",
         fmt::format("{} or {} lies {} off its place on the drawing, and the scan does not tell which. Scan "

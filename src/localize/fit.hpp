@@ -42,8 +42,18 @@ struct FitState {
   std::vector<MemberShift> members;
 };
 
+/// The pose may lie about here: offset from the estimate and covariance of (x, y, theta), part axes about the
+/// centroid.
+struct Chance {
+  double share = 1;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
 struct Estimate {
   FitState state;
+  /// How far members of this part stray is not known, so the pose is no Gaussian: one for each scale.
+  std::vector<Chance> chances;
   /// Of (x, y, theta, latency ms, inset mm), part axes about the centroid, mm and rad.
   Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
   std::vector<Eigen::Matrix3d> member_covariance;

@@ -25,21 +25,37 @@ CommonMatrix prior_information(const Priors& priors) {
   return out;
 }
 
-/// Scales of the member term, in units of the drawing's tolerance, with the logarithm of their prior weight:
-/// half for parts that are as drawn, the rest about the tolerance. Fewer parts as drawn would cost efficiency
-/// where they are, more would make three members that happen to agree look certain (NEES of bench localize).
-struct Scale {
-  double k, log_prior;
+/// Scales of the member term, in units of the drawing's tolerance, with the logarithm of their prior among
+/// parts that are not as drawn: log-normal about 0.9, a factor of 1.65 wide, with a floor for parts nearly as
+/// drawn.
+struct Prior {
+  double k, log_share;
 };
-constexpr std::array<Scale, 9> kScales{{{0, -0.71},
-                                        {0.1, -3.93},
-                                        {0.2, -3.53},
-                                        {0.35, -2.83},
-                                        {0.6, -2.06},
-                                        {0.9, -1.99},
-                                        {1.3, -2.32},
-                                        {1.9, -3.53},
-                                        {2.8, -4.63}}};
+constexpr std::array<Prior, 9> kScales{{{0.1, -3.30},
+                                        {0.2, -3.00},
+                                        {0.35, -2.40},
+                                        {0.6, -1.49},
+                                        {0.9, -1.16},
+                                        {1.3, -1.43},
+                                        {1.9, -2.28},
+                                        {2.8, -3.72},
+                                        {4.2, -5.87}}};
+/// Share of parts that are as drawn. Two members alone cannot tell whether they are, so the covariance doubts
+/// it the more there; the estimate of two or three bets on it, which costs little where the bet is lost
+/// (bench localize, frontier).
+constexpr double kAsDrawn = 0.5;
+constexpr double kAsDrawnOfTwo = 0.15;
+constexpr double kAsDrawnBetOfThree = 0.9;
+
+/// A share too small to matter in any sum.
+constexpr double kNoShare = 1e-7;
+
+double log_sum(const std::vector<double>& logs) {
+  const double best = *std::max_element(logs.begin(), logs.end());
+  double sum = 0;
+  for (const double log : logs) sum += std::exp(log - best);
+  return best + std::log(sum);
+}
 
 }  // namespace
 
@@ -84,43 +100,76 @@ Eigen::Vector3d NormalEquations::prior_sigma(double k, bool free_member) const {
   return {k * priors_.member_shift_mm, k * priors_.member_shift_mm, k * priors_.member_angle_rad};
 }
 
+NormalEquations::Reduced& NormalEquations::Reduced::operator+=(const Reduced& other) {
+  normal += other.normal;
+  right += other.right;
+  square += other.square;
+  log_determinant += other.log_determinant;
+  return *this;
+}
+
+NormalEquations::Reduced& NormalEquations::Reduced::operator-=(const Reduced& other) {
+  normal -= other.normal;
+  right -= other.right;
+  square -= other.square;
+  log_determinant -= other.log_determinant;
+  return *this;
+}
+
+NormalEquations::Reduced NormalEquations::reduced(std::size_t member, double k, bool free_member,
+                                                  const Block& block, Eigen::Matrix3d& posterior) const {
+  const Sums& sums = sums_[member];
+  const Eigen::Vector3d sigma = prior_sigma(k, free_member);
+  Reduced out;
+  if (!touches(member)) {
+    posterior = sigma.cwiseAbs2().asDiagonal();
+    return out;
+  }
+  out.normal = sums.topLeftCorner<5, 5>().selfadjointView<Eigen::Upper>();
+  out.right = sums.topRightCorner<5, 1>();
+  out.square = sums(5, 5);
+  if (k <= 0 && !free_member) {
+    posterior.setZero();
+    return out;
+  }
+  // Posterior covariance S^1/2 (I + S^1/2 G S^1/2)^-1 S^1/2: no division by a prior that may be tiny.
+  const Eigen::Matrix3d inner =
+      Eigen::Matrix3d::Identity() + sigma.asDiagonal() * block.gram * sigma.asDiagonal();
+  posterior = sigma.asDiagonal() * inner.inverse() * sigma.asDiagonal();
+  const Eigen::Matrix<double, 3, 5> carry = posterior * block.cross;
+  out.log_determinant = std::log(inner.determinant());
+  out.normal -= block.cross.transpose() * carry;
+  out.right -= carry.transpose() * block.right;
+  out.square -= block.right.dot(posterior * block.right);
+  return out;
+}
+
+NormalEquations::Reduced NormalEquations::common_prior() const {
+  Reduced out;
+  out.normal = prior_information(priors_);
+  out.log_determinant = -std::log(precision(priors_.latency_ms)) - std::log(precision(priors_.inset_mm));
+  return out;
+}
+
+double NormalEquations::evidence_of(const Reduced& total) const {
+  const Eigen::LDLT<CommonMatrix> factor(total.normal);
+  const double log_determinant = total.log_determinant + factor.vectorD().cwiseAbs().array().log().sum();
+  return -0.5 * (log_determinant + total.square - total.right.dot(factor.solve(total.right)));
+}
+
 Solution NormalEquations::solve(double k, const std::vector<bool>& free_members, bool with_members) const {
-  CommonMatrix normal = prior_information(priors_);
-  Common right = Common::Zero();
-  double log_determinant = 0, square = 0;
+  Reduced total = common_prior();
   std::vector<Block> blocks(sums_.size());
   std::vector<Eigen::Matrix3d> posterior(sums_.size());
   for (std::size_t m = 0; m < sums_.size(); ++m) {
-    const Sums& sums = sums_[m];
-    normal += CommonMatrix(sums.topLeftCorner<5, 5>().selfadjointView<Eigen::Upper>());
-    right += sums.topRightCorner<5, 1>();
-    square += sums(5, 5);
-    posterior[m].setZero();
-    if (sums(5, 5) == 0 && sums(0, 0) + sums(1, 1) == 0) {
-      const Eigen::Vector3d sigma = prior_sigma(k, free_members[m]);
-      posterior[m] = sigma.cwiseAbs2().asDiagonal();
-      blocks[m] = {Eigen::Matrix3d::Zero(), Eigen::Matrix<double, 3, 5>::Zero(), Eigen::Vector3d::Zero()};
-      continue;
-    }
     blocks[m] = block(m);
-    if (k <= 0 && !free_members[m]) continue;
-    const Eigen::Vector3d sigma = prior_sigma(k, free_members[m]);
-    // Posterior covariance S^1/2 (I + S^1/2 G S^1/2)^-1 S^1/2: no division by a prior that may be tiny.
-    const Eigen::Matrix3d inner =
-        Eigen::Matrix3d::Identity() + sigma.asDiagonal() * blocks[m].gram * sigma.asDiagonal();
-    posterior[m] = sigma.asDiagonal() * inner.inverse() * sigma.asDiagonal();
-    log_determinant += std::log(inner.determinant());
-    normal -= blocks[m].cross.transpose() * posterior[m] * blocks[m].cross;
-    right -= blocks[m].cross.transpose() * (posterior[m] * blocks[m].right);
-    square -= blocks[m].right.dot(posterior[m] * blocks[m].right);
+    total += reduced(m, k, free_members[m], blocks[m], posterior[m]);
   }
   Solution out;
-  const Eigen::LDLT<CommonMatrix> factor(normal);
-  out.common = factor.solve(right);
+  const Eigen::LDLT<CommonMatrix> factor(total.normal);
+  out.common = factor.solve(total.right);
   out.covariance = factor.solve(CommonMatrix::Identity());
-  log_determinant += factor.vectorD().cwiseAbs().array().log().sum();
-  log_determinant -= std::log(precision(priors_.latency_ms)) + std::log(precision(priors_.inset_mm));
-  out.log_evidence = -0.5 * (log_determinant + square - right.dot(out.common));
+  out.log_evidence = evidence_of(total);
   if (!with_members) return out;
   out.members.resize(sums_.size());
   for (std::size_t m = 0; m < sums_.size(); ++m) {
@@ -131,39 +180,98 @@ Solution NormalEquations::solve(double k, const std::vector<bool>& free_members,
   return out;
 }
 
-Solution NormalEquations::solve_over_scales(const std::vector<bool>& free_members) const {
-  const bool rigid = !(priors_.member_shift_mm > 0 || priors_.member_angle_rad > 0);
-  if (rigid) return solve(0, free_members, true);
-  std::vector<Solution> each;
-  std::vector<double> log_weight;
-  for (const Scale& scale : kScales) {
-    each.push_back(solve(scale.k, free_members, true));
-    log_weight.push_back(each.back().log_evidence + scale.log_prior);
+struct NormalEquations::Scale {
+  double k, log_weight, log_bet;
+};
+
+std::vector<NormalEquations::Scale> NormalEquations::scales() const {
+  // A member alone is the part.
+  const bool rigid = sums_.size() < 2 || !(priors_.member_shift_mm > 0 || priors_.member_angle_rad > 0);
+  if (rigid) return {{0, 0, 0}};
+  std::size_t seen = 0;
+  for (std::size_t m = 0; m < sums_.size(); ++m) seen += touches(m);
+  const double drawn = seen <= 2 ? kAsDrawnOfTwo : kAsDrawn;
+  const double bet = seen <= 3 ? kAsDrawnBetOfThree : drawn;
+  std::vector<Scale> out{{0, std::log(drawn), std::log(bet)}};
+  for (const Prior& prior : kScales) {
+    out.push_back({prior.k, std::log(1 - drawn) + prior.log_share, std::log(1 - bet) + prior.log_share});
   }
-  return mean_of(each, log_weight);
+  return out;
 }
 
-Solution mean_of(const std::vector<Solution>& each, const std::vector<double>& log_weight) {
-  const double best = *std::max_element(log_weight.begin(), log_weight.end());
-  double sum = 0;
-  for (const double w : log_weight) sum += std::exp(w - best);
-  Solution out;
-  const std::size_t members = each.front().members.size();
-  out.members.resize(members);
-  out.log_evidence = best + std::log(sum);
-  for (std::size_t i = 0; i < each.size(); ++i) {
-    const double share = std::exp(log_weight[i] - best) / sum;
-    out.common += share * each[i].common;
-    for (std::size_t m = 0; m < members; ++m) out.members[m].shift += share * each[i].members[m].shift;
+std::vector<Weighed> NormalEquations::over_scales(const std::vector<bool>& free_members) const {
+  std::vector<Weighed> out;
+  for (const Scale& scale : scales()) {
+    Solution solution = solve(scale.k, free_members, true);
+    const double evidence = solution.log_evidence;
+    out.push_back({std::move(solution), evidence + scale.log_weight, evidence + scale.log_bet});
   }
-  for (std::size_t i = 0; i < each.size(); ++i) {
-    const double share = std::exp(log_weight[i] - best) / sum;
-    const Common off = each[i].common - out.common;
-    out.covariance += share * (each[i].covariance + off * off.transpose());
-    for (std::size_t m = 0; m < members; ++m) {
-      const MemberShift member_off = each[i].members[m].shift - out.members[m].shift;
+  return out;
+}
+
+double NormalEquations::evidence(const std::vector<bool>& free_members) const {
+  std::vector<double> each;
+  for (const Scale& scale : scales())
+    each.push_back(solve(scale.k, free_members, false).log_evidence + scale.log_weight);
+  return log_sum(each);
+}
+
+std::vector<double> NormalEquations::evidence_turned(const std::vector<bool>& free_members,
+                                                     const std::vector<std::size_t>& members) const {
+  std::vector<Block> blocks(sums_.size());
+  for (std::size_t m = 0; m < sums_.size(); ++m) blocks[m] = block(m);
+  std::vector<std::vector<double>> each(members.size());
+  Eigen::Matrix3d unused;
+  for (const Scale& scale : scales()) {
+    Reduced total = common_prior();
+    for (std::size_t m = 0; m < sums_.size(); ++m)
+      total += reduced(m, scale.k, free_members[m], blocks[m], unused);
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      const std::size_t m = members[i];
+      Reduced turned = total;
+      turned -= reduced(m, scale.k, free_members[m], blocks[m], unused);
+      turned += reduced(m, scale.k, !free_members[m], blocks[m], unused);
+      each[i].push_back(evidence_of(turned) + scale.log_weight);
+    }
+  }
+  std::vector<double> out;
+  for (const std::vector<double>& logs : each) out.push_back(log_sum(logs));
+  return out;
+}
+
+Solution mean_of(const std::vector<Weighed>& each) {
+  std::vector<double> bets;
+  for (const Weighed& w : each) bets.push_back(w.log_bet);
+  const double all = log_sum(bets);
+  Solution estimate;
+  estimate.members.resize(each.front().solution.members.size());
+  for (const Weighed& w : each) {
+    const double share = std::exp(w.log_bet - all);
+    estimate.common += share * w.solution.common;
+    for (std::size_t m = 0; m < estimate.members.size(); ++m)
+      estimate.members[m].shift += share * w.solution.members[m].shift;
+  }
+  return about(each, estimate);
+}
+
+Solution about(const std::vector<Weighed>& each, const Solution& estimate) {
+  std::vector<double> weights;
+  for (const Weighed& w : each) weights.push_back(w.log_weight);
+  Solution out;
+  out.log_evidence = log_sum(weights);
+  out.common = estimate.common;
+  out.members.resize(estimate.members.size());
+  for (std::size_t m = 0; m < out.members.size(); ++m) out.members[m].shift = estimate.members[m].shift;
+  for (const Weighed& w : each) {
+    const double share = std::exp(w.log_weight - out.log_evidence);
+    if (share < kNoShare) continue;
+    const Common off = w.solution.common - out.common;
+    out.covariance += share * (w.solution.covariance + off * off.transpose());
+    out.chances.push_back({share, off.head<3>(), w.solution.covariance.topLeftCorner<3, 3>()});
+    for (std::size_t m = 0; m < out.members.size(); ++m) {
+      const MemberShift member_off = w.solution.members[m].shift - out.members[m].shift;
       out.members[m].covariance +=
-          share * (each[i].members[m].covariance + member_off * member_off.transpose());
+          share * (w.solution.members[m].covariance + member_off * member_off.transpose());
     }
   }
   return out;

@@ -25,13 +25,23 @@ struct MemberSolution {
 
 struct Solution {
   Common common = Common::Zero();
-  CommonMatrix covariance = CommonMatrix::Zero();
+  CommonMatrix covariance = CommonMatrix::Zero();  ///< mean square about `common`
   std::vector<MemberSolution> members;
-  double log_evidence = 0;  ///< restricted likelihood of the member scale, up to a constant
+  double log_evidence = 0;      ///< restricted likelihood of the member scale, up to a constant
+  std::vector<Chance> chances;  ///< of the pose about `common`, shares sum to 1; empty when there is one only
 };
 
-/// The mean over several answers, each with its log weight; covariances grow by the spread between them.
-Solution mean_of(const std::vector<Solution>& each, const std::vector<double>& log_weight);
+/// One answer of several, with its log weights: in how far the truth may lie there, and in how far the
+/// estimate bets on it.
+struct Weighed {
+  Solution solution;
+  double log_weight = 0, log_bet = 0;
+};
+
+/// The mean over several answers by their bets; the covariance is the mean square about it by their weights.
+Solution mean_of(const std::vector<Weighed>& each);
+/// The same about a given estimate (its `common` and the members' shifts).
+Solution about(const std::vector<Weighed>& each, const Solution& estimate);
 
 class NormalEquations {
  public:
@@ -49,8 +59,13 @@ class NormalEquations {
   Common solve_rigid() const;
   /// With member shifts of prior k * tolerance; members flagged free have a wide prior instead. k = 0: rigid.
   Solution solve(double k, const std::vector<bool>& free_members, bool with_members) const;
-  /// Mean over the scale k, each k weighted by its evidence and a broad prior around the drawing's tolerance.
-  Solution solve_over_scales(const std::vector<bool>& free_members) const;
+  /// One answer for each scale k, weighed by its evidence and the prior of the scales.
+  std::vector<Weighed> over_scales(const std::vector<bool>& free_members) const;
+  /// Log-evidence over all scales.
+  double evidence(const std::vector<bool>& free_members) const;
+  /// The same with the flag of one member turned, for each of the members given.
+  std::vector<double> evidence_turned(const std::vector<bool>& free_members,
+                                      const std::vector<std::size_t>& members) const;
   /// A member's own shift when nothing is assumed about it, given the common solution.
   MemberSolution unshrunk(std::size_t member, const Common& common) const;
 
@@ -61,8 +76,23 @@ class NormalEquations {
     Eigen::Matrix<double, 3, 5> cross;
     Eigen::Vector3d right;
   };
+  /// What members leave to the common parameters once their own shifts are eliminated.
+  struct Reduced {
+    CommonMatrix normal = CommonMatrix::Zero();
+    Common right = Common::Zero();
+    double square = 0, log_determinant = 0;
+    Reduced& operator+=(const Reduced& other);
+    Reduced& operator-=(const Reduced& other);
+  };
+  struct Scale;
   Block block(std::size_t member) const;
   Eigen::Vector3d prior_sigma(double k, bool free_member) const;
+  /// Covariance of a member's shift given the common parameters, and what the member then leaves.
+  Reduced reduced(std::size_t member, double k, bool free_member, const Block& block,
+                  Eigen::Matrix3d& posterior) const;
+  Reduced common_prior() const;
+  double evidence_of(const Reduced& total) const;
+  std::vector<Scale> scales() const;
 
   std::vector<Vec2> centroids_;
   Priors priors_;

@@ -1,6 +1,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 
 #include "fit.hpp"
 #include "normal_equations.hpp"
@@ -165,7 +167,7 @@ class Refinement {
       const Row row = row_of(fields_, crossings_[i], fit_.matches[i], c, s, priors.inset_everywhere);
       equations.add(member_of(i), row, inlier / (sigma * sigma));
     }
-    return equations.solve_over_scales(free_).log_evidence;
+    return equations.evidence(free_);
   }
 
   /// One member far off among members that are as drawn must not widen the tolerance of all: it is set free
@@ -175,19 +177,15 @@ class Refinement {
     if (priors_.member_shift_mm <= 0) return;
     place();
     weigh_mixture(equations);
-    double held = equations.solve_over_scales(free_).log_evidence;
+    double held = equations.evidence(free_);
     for (std::size_t freed = 0; freed < std::max<std::size_t>(1, free_.size() / 4); ++freed) {
-      std::size_t best = free_.size();
-      double gain = kFreeMember_nats;
-      for (const std::size_t m : most_displaced(equations)) {
-        free_[m] = true;
-        const double evidence = equations.solve_over_scales(free_).log_evidence;
-        free_[m] = false;
-        if (evidence - held > gain) gain = evidence - held, best = m;
-      }
-      if (best == free_.size()) return;
-      free_[best] = true;
-      held += gain;
+      const std::vector<std::size_t> tried = most_displaced(equations);
+      if (tried.empty()) return;
+      const std::vector<double> evidence = equations.evidence_turned(free_, tried);
+      const auto best = std::max_element(evidence.begin(), evidence.end());
+      if (*best - held <= kFreeMember_nats) return;
+      free_[tried[static_cast<std::size_t>(best - evidence.begin())]] = true;
+      held = *best;
     }
   }
 
@@ -212,21 +210,42 @@ class Refinement {
     place();
     NormalEquations equations(fields_.member_centroids(), priors_);
     weigh_mixture(equations);
-    take(solve_over_latency(equations, free_));
+    take(mean_of(over_latency(equations, free_)));
     if (step == 1 || step == 2) rescale();
   }
 
   /// A latency outside its prior must not bend the pose: its stated prior and a wide one stand side by side,
   /// and the evidence, which charges the wide one for what it allows, weighs them.
-  Solution solve_over_latency(NormalEquations& equations, const std::vector<bool>& free_members) const {
+  std::vector<Weighed> over_latency(NormalEquations& equations, const std::vector<bool>& free_members) const {
     equations.set_priors(priors_);
-    Solution stated = equations.solve_over_scales(free_members);
-    if (priors_.latency_ms <= 0) return stated;
+    std::vector<Weighed> out = equations.over_scales(free_members);
+    if (priors_.latency_ms <= 0) return out;
+    equations.set_priors(wide_latency());
+    for (Weighed& w : equations.over_scales(free_members)) out.push_back(std::move(w));
+    return out;
+  }
+
+  Priors wide_latency() const {
     Priors wide = priors_;
     wide.latency_ms = kWideLatency_ms;
-    equations.set_priors(wide);
-    Solution free = equations.solve_over_scales(free_members);
-    return mean_of({stated, free}, {stated.log_evidence, free.log_evidence});
+    return wide;
+  }
+
+  /// Log-evidence of each member alone being free, over both latencies.
+  std::vector<double> evidence_of_each(NormalEquations& equations) const {
+    const std::vector<bool> none(free_.size(), false);
+    std::vector<std::size_t> members(free_.size());
+    std::iota(members.begin(), members.end(), std::size_t{0});
+    equations.set_priors(priors_);
+    std::vector<double> out = equations.evidence_turned(none, members);
+    if (priors_.latency_ms <= 0) return out;
+    equations.set_priors(wide_latency());
+    const std::vector<double> wide = equations.evidence_turned(none, members);
+    for (std::size_t m = 0; m < out.size(); ++m) {
+      const double best = std::max(out[m], wide[m]);
+      out[m] = best + std::log(std::exp(out[m] - best) + std::exp(wide[m] - best));
+    }
+    return out;
   }
 
   /// A rail pulled off its rungs looks the same as the rest of the part pulled off that rail. Where another
@@ -237,40 +256,27 @@ class Refinement {
     place();
     NormalEquations equations(fields_.member_centroids(), priors_);
     weigh_mixture(equations);
-    const Solution stated = solve_over_latency(equations, free_);
+    const std::vector<double> evidence = evidence_of_each(equations);
     std::size_t other = held;
-    Solution best;
-    best.log_evidence = stated.log_evidence - kTellsMembers_nats;
+    double best = evidence[held] - kTellsMembers_nats;
     for (std::size_t m = 0; m < free_.size(); ++m) {
-      if (m == held || !equations.touches(m)) continue;
-      std::vector<bool> swapped(free_.size(), false);
-      swapped[m] = true;
-      Solution found = solve_over_latency(equations, swapped);
-      if (found.log_evidence <= best.log_evidence) continue;
+      if (m == held || !equations.touches(m) || evidence[m] <= best) continue;
       other = m;
-      best = std::move(found);
+      best = evidence[m];
     }
     if (other == held) return;
+    std::vector<bool> swapped(free_.size(), false);
+    swapped[other] = true;
+    std::vector<Weighed> both = over_latency(equations, free_), second = over_latency(equations, swapped);
+    const Solution stated = mean_of(both);
     Either either{{static_cast<int>(held), after(stated)},
-                  {static_cast<int>(other), after(best)},
+                  {static_cast<int>(other), after(mean_of(second))},
                   stated.members[held].shift.head<2>().norm()};
-    Solution answer = mean_of({stated, best}, {stated.log_evidence, best.log_evidence});
-    spread_about(stated, answer);
-    take(answer);
+    // The likelier reading instead of the mean, which would be right in neither case; the covariance is the
+    // mean square about it over both.
+    both.insert(both.end(), std::make_move_iterator(second.begin()), std::make_move_iterator(second.end()));
+    take(about(both, stated));
     fit_.either = std::move(either);
-  }
-
-  /// The likelier reading instead of the mean, which would be right in neither case; the covariance becomes
-  /// the mean square about it.
-  static void spread_about(const Solution& chosen, Solution& mean) {
-    const Common off = chosen.common - mean.common;
-    mean.common = chosen.common;
-    mean.covariance += off * off.transpose();
-    for (std::size_t m = 0; m < mean.members.size(); ++m) {
-      const MemberShift member_off = chosen.members[m].shift - mean.members[m].shift;
-      mean.members[m].shift = chosen.members[m].shift;
-      mean.members[m].covariance += member_off * member_off.transpose();
-    }
   }
 
   /// What a solution leads to from here.
@@ -280,6 +286,7 @@ class Refinement {
     out.state.latency_ms = solution.common(3);
     out.state.inset_mm = solution.common(4);
     out.covariance = solution.covariance;
+    out.chances = solution.chances;
     for (std::size_t m = 0; m < free_.size(); ++m) {
       out.state.members[m] = solution.members[m].shift;
       out.member_covariance[m] = solution.members[m].covariance;

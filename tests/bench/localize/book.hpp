@@ -15,7 +15,7 @@ struct BenchOptions {
   int trials = 300;
   int paper_trials = 12;  ///< the paper's method takes a hundred times longer
   std::uint64_t seed = 90417;
-  std::string rows_file;  ///< also write the rows there as JSON, empty: not
+  std::string rows_file;          ///< also write the rows there as JSON, empty: not
   std::vector<std::string> only;  ///< cells whose name holds one of these words; none: all
 };
 

@@ -28,8 +28,8 @@ struct Tally {
   int judged = 0;  ///< trials inside the basin: only these count below
   double ratio_square = 0, nees = 0, latency_square = 0;
   double ratio_fourth = 0, nees_square = 0;  ///< sums of squares of the two, for their standard errors
-  std::array<double, 3> error_square{};  ///< x, y (mm2) and theta (rad2) at the centroid
-  std::vector<double> ms;                ///< CPU time of each trial
+  std::array<double, 3> error_square{};      ///< x, y (mm2) and theta (rad2) at the centroid
+  std::vector<double> ms;                    ///< CPU time of each trial
   /// Why a good pose was refused or a wrong one accepted: "cause seed".
   std::map<std::string, int> blunders;
 
