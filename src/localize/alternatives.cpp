@@ -19,6 +19,8 @@ constexpr double kEndMargin_mm = 3;
 /// A side tells nothing about a step against it, nor along it.
 constexpr double kAgainst = -0.15;
 constexpr double kRoom_mm = 10;
+/// Members farther apart than this hide nothing of each other.
+constexpr double kBeside_mm = 2;
 /// Below this nothing is worth a closer look.
 constexpr double kHopeless_nats = 3;
 
@@ -62,6 +64,8 @@ Alternatives::Alternatives(const workpiece::OutlineTemplate& outline, const std:
     const Vec2 t = about - turn.rotate(about) + u.head<2>();
     members_.push_back(transformed(outline.members[m], {t.x(), t.y(), u.z()}));
   }
+  for (const Polygon& member : members_) boxes_.push_back(bounds(member));
+  drawn_.resize(members_.size());
   const double c = std::cos(fit.state.pose.theta_rad), s = std::sin(fit.state.pose.theta_rad);
   const auto turned = [&](const Vec2& v) { return Vec2(c * v.x() + s * v.y(), -s * v.x() + c * v.y()); };
   spots_.reserve(crossings.size());
@@ -129,33 +133,75 @@ int Alternatives::unseen_on(const std::vector<VisibleEdge>& edges, const Region&
   return out;
 }
 
-std::vector<VisibleEdge> Alternatives::edges_within(const std::vector<Polygon>& members, const Box2& box) {
+std::vector<VisibleEdge> Alternatives::visible(const std::vector<Polygon>& members,
+                                               std::size_t member) const {
+  // Only what lies beside a member hides anything of it; the order of the others stays, since it decides who
+  // shows a piece that two share.
+  if (members[member].empty()) return {};
+  const Box2 near = grown(bounds(members[member]), kBeside_mm);
+  std::vector<Polygon> beside;
+  std::size_t own = 0;
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    if (members[m].empty() || apart(is_drawn(members, m) ? boxes_[m] : bounds(members[m]), near)) continue;
+    if (m == member) own = beside.size();
+    beside.push_back(members[m]);
+  }
+  std::vector<VisibleEdge> out = workpiece::visible_edges(beside, own);
+  for (VisibleEdge& edge : out) edge.member = static_cast<int>(member);
+  return out;
+}
+
+bool Alternatives::is_drawn(const std::vector<Polygon>& members, std::size_t member) const {
+  return members[member].size() == members_[member].size() &&
+         (members[member].empty() || members[member].front() == members_[member].front());
+}
+
+std::vector<VisibleEdge> Alternatives::edges_within(const std::vector<Polygon>& members,
+                                                    const Box2& box) const {
+  // Where a member is not as drawn here, what is beside its old or its new place may show other edges.
+  std::vector<Box2> changed;
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    if (is_drawn(members, m)) continue;
+    changed.push_back(grown(boxes_[m], kBeside_mm));
+    if (!members[m].empty()) changed.push_back(grown(bounds(members[m]), kBeside_mm));
+  }
   std::vector<VisibleEdge> edges;
   for (std::size_t m = 0; m < members.size(); ++m) {
-    if (members[m].empty() || apart(bounds(members[m]), box)) continue;
-    for (const VisibleEdge& edge : workpiece::visible_edges(members, m)) edges.push_back(edge);
+    if (members[m].empty()) continue;
+    const bool drawn = is_drawn(members, m);
+    const Box2 own = drawn ? boxes_[m] : bounds(members[m]);
+    if (apart(own, box)) continue;
+    const bool anew =
+        !drawn || std::any_of(changed.begin(), changed.end(), [&](const Box2& c) { return !apart(own, c); });
+    if (anew) {
+      for (const VisibleEdge& edge : visible(members, m)) edges.push_back(edge);
+      continue;
+    }
+    if (!drawn_[m]) drawn_[m] = visible(members_, m);
+    edges.insert(edges.end(), drawn_[m]->begin(), drawn_[m]->end());
   }
   return edges;
 }
 
 double Alternatives::explained_nats(const std::vector<VisibleEdge>& edges, const Region& region) const {
-  struct Line {
-    Vec2 a, d, n;
-    double length;
-  };
-  std::vector<Line> lines;
-  for (const VisibleEdge& e : edges)
-    lines.push_back({e.line.a, e.line.direction(), e.outward, e.line.length()});
-  const auto explained = std::count_if(region.spots.begin(), region.spots.end(), [&](const Spot& s) {
-    return std::any_of(lines.begin(), lines.end(), [&](const Line& e) {
-      const Vec2 from = s.place - e.a;
-      if (std::abs(from.dot(e.n)) > kOnEdge_mm) return false;
-      if (s.directed && s.inward.dot(e.n) >= kAgainst) return false;
-      const double along = from.dot(e.d);
-      return along >= -kOnEdge_mm && along <= e.length + kOnEdge_mm;
-    });
-  });
-  return point_nats_ * static_cast<double>(explained);
+  std::vector<bool> explained(region.spots.size(), false);
+  const auto before = [](const Spot& s, double x) { return s.place.x() < x; };
+  for (const VisibleEdge& e : edges) {
+    const Vec2 d = e.line.direction();
+    const double length = e.line.length(), reach = 2 * kOnEdge_mm;
+    const double last = std::max(e.line.a.x(), e.line.b.x()) + reach;
+    auto s = std::lower_bound(region.spots.begin(), region.spots.end(),
+                              std::min(e.line.a.x(), e.line.b.x()) - reach, before);
+    for (; s != region.spots.end() && s->place.x() <= last; ++s) {
+      const Vec2 from = s->place - e.line.a;
+      if (std::abs(from.dot(e.outward)) > kOnEdge_mm) continue;
+      if (s->directed && s->inward.dot(e.outward) >= kAgainst) continue;
+      const double along = from.dot(d);
+      if (along < -kOnEdge_mm || along > length + kOnEdge_mm) continue;
+      explained[static_cast<std::size_t>(s - region.spots.begin())] = true;
+    }
+  }
+  return point_nats_ * static_cast<double>(std::count(explained.begin(), explained.end(), true));
 }
 
 double Alternatives::score(const std::vector<Polygon>& members, const Region& region) const {
@@ -265,8 +311,7 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
   Region region = around(m);
   const std::vector<Vote> found = votes(m, region, anywhere);
   const int bared = bared_by(m, region);
-  const double lost =
-      unseen_[m] > 0 ? unseen_nats_ * unseen_on(workpiece::visible_edges(members_, m), region) : 0;
+  const double lost = unseen_[m] > 0 ? unseen_nats_ * unseen_on(visible(members_, m), region) : 0;
 
   struct Trial {
     Vec2 shift;
@@ -293,8 +338,7 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
     const double most = point_nats_ * (trial.points + bared) + lost;
     if (trial.shift.norm() < kLeast_mm || most < kHopeless_nats) continue;
     members[m] = shifted(members_[m], trial.shift);
-    if (most - unseen_nats_ * unseen_on(workpiece::visible_edges(members, m), region) < kHopeless_nats)
-      continue;
+    if (most - unseen_nats_ * unseen_on(visible(members, m), region) < kHopeless_nats) continue;
     if (!drawn_known) region.drawn_nats = score(members_, region), drawn_known = true;
     const double gain = score(members, region) - region.drawn_nats;
     if (gain > best.gain_nats) best = {member, trial.shift, trial.points, gain};

@@ -2,6 +2,7 @@
 // it is. Pure.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -62,8 +63,12 @@ class Alternatives {
   };
 
   Region around(std::size_t member) const;
-  static std::vector<workpiece::VisibleEdge> edges_within(const std::vector<Polygon>& members,
-                                                          const Box2& box);
+  std::vector<workpiece::VisibleEdge> edges_within(const std::vector<Polygon>& members,
+                                                   const Box2& box) const;
+  /// Whether the member lies where members_ has it.
+  bool is_drawn(const std::vector<Polygon>& members, std::size_t member) const;
+  /// The edges that a member of the drawing shows.
+  std::vector<workpiece::VisibleEdge> visible(const std::vector<Polygon>& members, std::size_t member) const;
   double explained_nats(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
   double score(const std::vector<Polygon>& members, const Region& region) const;
   int unseen_on(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
@@ -71,7 +76,10 @@ class Alternatives {
   int bared_by(std::size_t member, const Region& region) const;
 
   std::vector<Polygon> members_;  ///< where the fit has them, frame Part
-  std::vector<Spot> spots_;       ///< by x
+  std::vector<Box2> boxes_;       ///< of members_
+  /// Visible edges of members_, made when first asked for: not for more than one thread.
+  mutable std::vector<std::optional<std::vector<workpiece::VisibleEdge>>> drawn_;
+  std::vector<Spot> spots_;  ///< by x
   std::vector<Piece> pieces_;
   std::vector<int> unseen_;  ///< crossings of each member that were expected and not seen
   double point_nats_ = 6, unseen_nats_ = 3;

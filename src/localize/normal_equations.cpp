@@ -144,10 +144,12 @@ NormalEquations::Reduced NormalEquations::reduced(std::size_t member, double k, 
   return out;
 }
 
-NormalEquations::Reduced NormalEquations::common_prior() const {
+NormalEquations::Reduced NormalEquations::common_prior(double latency_ms) const {
   Reduced out;
-  out.normal = prior_information(priors_);
-  out.log_determinant = -std::log(precision(priors_.latency_ms)) - std::log(precision(priors_.inset_mm));
+  Priors priors = priors_;
+  priors.latency_ms = latency_ms;
+  out.normal = prior_information(priors);
+  out.log_determinant = -std::log(precision(priors.latency_ms)) - std::log(precision(priors.inset_mm));
   return out;
 }
 
@@ -157,27 +159,49 @@ double NormalEquations::evidence_of(const Reduced& total) const {
   return -0.5 * (log_determinant + total.square - total.right.dot(factor.solve(total.right)));
 }
 
-Solution NormalEquations::solve(double k, const std::vector<bool>& free_members, bool with_members) const {
-  Reduced total = common_prior();
-  std::vector<Block> blocks(sums_.size());
-  std::vector<Eigen::Matrix3d> posterior(sums_.size());
+std::vector<NormalEquations::Block> NormalEquations::blocks() const {
+  std::vector<Block> out(sums_.size());
   for (std::size_t m = 0; m < sums_.size(); ++m) {
-    blocks[m] = block(m);
-    total += reduced(m, k, free_members[m], blocks[m], posterior[m]);
-  }
-  Solution out;
-  const Eigen::LDLT<CommonMatrix> factor(total.normal);
-  out.common = factor.solve(total.right);
-  out.covariance = factor.solve(CommonMatrix::Identity());
-  out.log_evidence = evidence_of(total);
-  if (!with_members) return out;
-  out.members.resize(sums_.size());
-  for (std::size_t m = 0; m < sums_.size(); ++m) {
-    const Eigen::Matrix<double, 3, 5> carry = posterior[m] * blocks[m].cross;
-    out.members[m].shift = posterior[m] * blocks[m].right - carry * out.common;
-    out.members[m].covariance = posterior[m] + carry * out.covariance * carry.transpose();
+    if (touches(m)) {
+      out[m] = block(m);
+    } else {
+      out[m] = {Eigen::Matrix3d::Zero(), Eigen::Matrix<double, 3, 5>::Zero(), Eigen::Vector3d::Zero()};
+    }
   }
   return out;
+}
+
+std::vector<Solution> NormalEquations::solve_each(double k, const std::vector<bool>& free_members,
+                                                  const std::vector<double>& latencies_ms,
+                                                  const std::vector<Block>& blocks) const {
+  Reduced seen;
+  std::vector<Eigen::Matrix3d> posterior(sums_.size());
+  for (std::size_t m = 0; m < sums_.size(); ++m)
+    seen += reduced(m, k, free_members[m], blocks[m], posterior[m]);
+  std::vector<Solution> out;
+  for (const double latency_ms : latencies_ms) {
+    Reduced total = common_prior(latency_ms);
+    total += seen;
+    Solution one;
+    const Eigen::LDLT<CommonMatrix> factor(total.normal);
+    one.common = factor.solve(total.right);
+    one.covariance = factor.solve(CommonMatrix::Identity());
+    one.log_evidence = evidence_of(total);
+    one.members.resize(sums_.size());
+    for (std::size_t m = 0; m < sums_.size(); ++m) {
+      one.members[m].covariance = posterior[m];
+      if (!touches(m)) continue;
+      const Eigen::Matrix<double, 3, 5> carry = posterior[m] * blocks[m].cross;
+      one.members[m].shift = posterior[m] * blocks[m].right - carry * one.common;
+      one.members[m].covariance += carry * one.covariance * carry.transpose();
+    }
+    out.push_back(std::move(one));
+  }
+  return out;
+}
+
+Solution NormalEquations::solve(double k, const std::vector<bool>& free_members) const {
+  return std::move(solve_each(k, free_members, {priors_.latency_ms}, blocks()).front());
 }
 
 struct NormalEquations::Scale {
@@ -199,39 +223,52 @@ std::vector<NormalEquations::Scale> NormalEquations::scales() const {
   return out;
 }
 
-std::vector<Weighed> NormalEquations::over_scales(const std::vector<bool>& free_members) const {
+std::vector<Weighed> NormalEquations::over_scales(const std::vector<bool>& free_members,
+                                                  const std::vector<double>& latencies_ms) const {
   std::vector<Weighed> out;
+  const std::vector<Block> all = blocks();
   for (const Scale& scale : scales()) {
-    Solution solution = solve(scale.k, free_members, true);
-    const double evidence = solution.log_evidence;
-    out.push_back({std::move(solution), evidence + scale.log_weight, evidence + scale.log_bet});
+    for (Solution& solution : solve_each(scale.k, free_members, latencies_ms, all)) {
+      const double evidence = solution.log_evidence;
+      out.push_back({std::move(solution), evidence + scale.log_weight, evidence + scale.log_bet});
+    }
   }
   return out;
 }
 
 double NormalEquations::evidence(const std::vector<bool>& free_members) const {
   std::vector<double> each;
-  for (const Scale& scale : scales())
-    each.push_back(solve(scale.k, free_members, false).log_evidence + scale.log_weight);
+  const std::vector<Block> all = blocks();
+  Eigen::Matrix3d unused;
+  for (const Scale& scale : scales()) {
+    Reduced total = common_prior(priors_.latency_ms);
+    for (std::size_t m = 0; m < sums_.size(); ++m)
+      total += reduced(m, scale.k, free_members[m], all[m], unused);
+    each.push_back(evidence_of(total) + scale.log_weight);
+  }
   return log_sum(each);
 }
 
 std::vector<double> NormalEquations::evidence_turned(const std::vector<bool>& free_members,
-                                                     const std::vector<std::size_t>& members) const {
-  std::vector<Block> blocks(sums_.size());
-  for (std::size_t m = 0; m < sums_.size(); ++m) blocks[m] = block(m);
+                                                     const std::vector<std::size_t>& members,
+                                                     const std::vector<double>& latencies_ms) const {
+  const std::vector<Block> all = blocks();
   std::vector<std::vector<double>> each(members.size());
   Eigen::Matrix3d unused;
   for (const Scale& scale : scales()) {
-    Reduced total = common_prior();
+    Reduced seen;
     for (std::size_t m = 0; m < sums_.size(); ++m)
-      total += reduced(m, scale.k, free_members[m], blocks[m], unused);
+      seen += reduced(m, scale.k, free_members[m], all[m], unused);
     for (std::size_t i = 0; i < members.size(); ++i) {
       const std::size_t m = members[i];
-      Reduced turned = total;
-      turned -= reduced(m, scale.k, free_members[m], blocks[m], unused);
-      turned += reduced(m, scale.k, !free_members[m], blocks[m], unused);
-      each[i].push_back(evidence_of(turned) + scale.log_weight);
+      Reduced turned = seen;
+      turned -= reduced(m, scale.k, free_members[m], all[m], unused);
+      turned += reduced(m, scale.k, !free_members[m], all[m], unused);
+      for (const double latency_ms : latencies_ms) {
+        Reduced total = common_prior(latency_ms);
+        total += turned;
+        each[i].push_back(evidence_of(total) + scale.log_weight);
+      }
     }
   }
   std::vector<double> out;

@@ -50,22 +50,23 @@ class NormalEquations {
 
   void clear();
   void add(int member, const Row& row, double weight);
-  /// Other priors over the same sums.
-  void set_priors(const Priors& priors) { priors_ = priors; }
-
   /// Whether any row belongs to the member.
   bool touches(std::size_t member) const { return sums_[member](0, 0) + sums_[member](1, 1) > 0; }
   /// Common parameters alone, members rigid.
   Common solve_rigid() const;
   /// With member shifts of prior k * tolerance; members flagged free have a wide prior instead. k = 0: rigid.
-  Solution solve(double k, const std::vector<bool>& free_members, bool with_members) const;
-  /// One answer for each scale k, weighed by its evidence and the prior of the scales.
-  std::vector<Weighed> over_scales(const std::vector<bool>& free_members) const;
+  Solution solve(double k, const std::vector<bool>& free_members) const;
+  /// One answer for each scale k and each prior of the latency, weighed by its evidence and the prior of the
+  /// scales.
+  std::vector<Weighed> over_scales(const std::vector<bool>& free_members,
+                                   const std::vector<double>& latencies_ms) const;
   /// Log-evidence over all scales.
   double evidence(const std::vector<bool>& free_members) const;
-  /// The same with the flag of one member turned, for each of the members given.
+  /// The same over the priors of the latency with the flag of one member turned, for each of the members
+  /// given.
   std::vector<double> evidence_turned(const std::vector<bool>& free_members,
-                                      const std::vector<std::size_t>& members) const;
+                                      const std::vector<std::size_t>& members,
+                                      const std::vector<double>& latencies_ms) const;
   /// A member's own shift when nothing is assumed about it, given the common solution.
   MemberSolution unshrunk(std::size_t member, const Common& common) const;
 
@@ -90,8 +91,13 @@ class NormalEquations {
   /// Covariance of a member's shift given the common parameters, and what the member then leaves.
   Reduced reduced(std::size_t member, double k, bool free_member, const Block& block,
                   Eigen::Matrix3d& posterior) const;
-  Reduced common_prior() const;
+  Reduced common_prior(double latency_ms) const;
+  std::vector<Block> blocks() const;
   double evidence_of(const Reduced& total) const;
+  /// One solution for each prior of the latency.
+  std::vector<Solution> solve_each(double k, const std::vector<bool>& free_members,
+                                   const std::vector<double>& latencies_ms,
+                                   const std::vector<Block>& blocks) const;
   std::vector<Scale> scales() const;
 
   std::vector<Vec2> centroids_;

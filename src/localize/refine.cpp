@@ -112,7 +112,7 @@ class Refinement {
       place();
       equations.clear();
       weigh_geman_mcclure(equations, scale);
-      take(equations.solve(1, free_, true));
+      take(equations.solve(1, free_));
     }
     const double shift = std::max(priors_.member_shift_mm, 0.2),
                  angle = std::max(priors_.member_angle_rad, 0.001);
@@ -181,7 +181,7 @@ class Refinement {
     for (std::size_t freed = 0; freed < std::max<std::size_t>(1, free_.size() / 4); ++freed) {
       const std::vector<std::size_t> tried = most_displaced(equations);
       if (tried.empty()) return;
-      const std::vector<double> evidence = equations.evidence_turned(free_, tried);
+      const std::vector<double> evidence = equations.evidence_turned(free_, tried, {priors_.latency_ms});
       const auto best = std::max_element(evidence.begin(), evidence.end());
       if (*best - held <= kFreeMember_nats) return;
       free_[tried[static_cast<std::size_t>(best - evidence.begin())]] = true;
@@ -191,7 +191,7 @@ class Refinement {
 
   /// The three members that strain most at a tight tolerance.
   std::vector<std::size_t> most_displaced(const NormalEquations& equations) const {
-    const Solution tight = equations.solve(0.5, free_, true);
+    const Solution tight = equations.solve(0.5, free_);
     std::vector<std::pair<double, std::size_t>> strain;
     for (std::size_t m = 0; m < free_.size(); ++m) {
       const MemberShift& u = tight.members[m].shift;
@@ -210,42 +210,15 @@ class Refinement {
     place();
     NormalEquations equations(fields_.member_centroids(), priors_);
     weigh_mixture(equations);
-    take(mean_of(over_latency(equations, free_)));
+    take(mean_of(equations.over_scales(free_, latencies_ms())));
     if (step == 1 || step == 2) rescale();
   }
 
   /// A latency outside its prior must not bend the pose: its stated prior and a wide one stand side by side,
   /// and the evidence, which charges the wide one for what it allows, weighs them.
-  std::vector<Weighed> over_latency(NormalEquations& equations, const std::vector<bool>& free_members) const {
-    equations.set_priors(priors_);
-    std::vector<Weighed> out = equations.over_scales(free_members);
-    if (priors_.latency_ms <= 0) return out;
-    equations.set_priors(wide_latency());
-    for (Weighed& w : equations.over_scales(free_members)) out.push_back(std::move(w));
-    return out;
-  }
-
-  Priors wide_latency() const {
-    Priors wide = priors_;
-    wide.latency_ms = kWideLatency_ms;
-    return wide;
-  }
-
-  /// Log-evidence of each member alone being free, over both latencies.
-  std::vector<double> evidence_of_each(NormalEquations& equations) const {
-    const std::vector<bool> none(free_.size(), false);
-    std::vector<std::size_t> members(free_.size());
-    std::iota(members.begin(), members.end(), std::size_t{0});
-    equations.set_priors(priors_);
-    std::vector<double> out = equations.evidence_turned(none, members);
-    if (priors_.latency_ms <= 0) return out;
-    equations.set_priors(wide_latency());
-    const std::vector<double> wide = equations.evidence_turned(none, members);
-    for (std::size_t m = 0; m < out.size(); ++m) {
-      const double best = std::max(out[m], wide[m]);
-      out[m] = best + std::log(std::exp(out[m] - best) + std::exp(wide[m] - best));
-    }
-    return out;
+  std::vector<double> latencies_ms() const {
+    if (priors_.latency_ms <= 0) return {0};
+    return {priors_.latency_ms, kWideLatency_ms};
   }
 
   /// A rail pulled off its rungs looks the same as the rest of the part pulled off that rail. Where another
@@ -256,7 +229,10 @@ class Refinement {
     place();
     NormalEquations equations(fields_.member_centroids(), priors_);
     weigh_mixture(equations);
-    const std::vector<double> evidence = evidence_of_each(equations);
+    std::vector<std::size_t> each(free_.size());
+    std::iota(each.begin(), each.end(), std::size_t{0});
+    const std::vector<double> evidence =
+        equations.evidence_turned(std::vector<bool>(free_.size(), false), each, latencies_ms());
     std::size_t other = held;
     double best = evidence[held] - kTellsMembers_nats;
     for (std::size_t m = 0; m < free_.size(); ++m) {
@@ -267,7 +243,8 @@ class Refinement {
     if (other == held) return;
     std::vector<bool> swapped(free_.size(), false);
     swapped[other] = true;
-    std::vector<Weighed> both = over_latency(equations, free_), second = over_latency(equations, swapped);
+    std::vector<Weighed> both = equations.over_scales(free_, latencies_ms()),
+                         second = equations.over_scales(swapped, latencies_ms());
     const Solution stated = mean_of(both);
     Either either{{static_cast<int>(held), after(stated)},
                   {static_cast<int>(other), after(mean_of(second))},

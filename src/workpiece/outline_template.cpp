@@ -28,17 +28,24 @@ void append_crossings(const Segment& line, const Polygon& polygon, std::vector<d
   }
 }
 
+bool apart(const Box2& a, const Box2& b, double margin_mm) {
+  return (a.min.array() > b.max.array() + margin_mm).any() ||
+         (b.min.array() > a.max.array() + margin_mm).any();
+}
+
 Segment shifted(const Segment& s, const Vec2& by) { return {s.a + by, s.b + by}; }
 
 /// Where a side lies with respect to one other member.
 struct Cover {
   const Polygon* polygon = nullptr;
+  Box2 box;  ///< what it can hide lies in here
   std::vector<double>
       offsets_mm;  ///< along the outward normal: the side is hidden where a so shifted point is inside
 };
 
 bool hidden(const Vec2& p, const Vec2& outward, const std::vector<Cover>& covers) {
   for (const Cover& cover : covers) {
+    if ((p.array() < cover.box.min.array()).any() || (p.array() > cover.box.max.array()).any()) continue;
     for (const double offset : cover.offsets_mm) {
       if (contains(*cover.polygon, p + offset * outward)) return true;
     }
@@ -50,7 +57,9 @@ bool hidden(const Vec2& p, const Vec2& outward, const std::vector<Cover>& covers
 std::vector<std::pair<double, double>> visible_intervals(const Segment& side, const Vec2& outward,
                                                          const std::vector<Cover>& covers) {
   std::vector<double> cuts{0, 1};
+  const Box2 own{side.a.cwiseMin(side.b), side.a.cwiseMax(side.b)};
   for (const Cover& cover : covers) {
+    if (apart(own, cover.box, 0)) continue;
     for (const double offset : cover.offsets_mm)
       append_crossings(shifted(side, offset * outward), *cover.polygon, cuts);
   }
@@ -69,18 +78,18 @@ std::vector<std::pair<double, double>> visible_intervals(const Segment& side, co
   return out;
 }
 
-bool apart(const Box2& a, const Box2& b, double margin_mm) {
-  return (a.min.array() > b.max.array() + margin_mm).any() ||
-         (b.min.array() > a.max.array() + margin_mm).any();
-}
-
 /// Of two members that share a piece of silhouette only the first one shows it.
 std::vector<Cover> covers_of(std::span<const Polygon> members, std::size_t member, double joint_gap_mm) {
   std::vector<Cover> covers;
   const Box2 own = bounds(members[member]);
   for (std::size_t j = 0; j < members.size(); ++j) {
-    if (j == member || members[j].empty() || apart(own, bounds(members[j]), 2 * joint_gap_mm)) continue;
-    Cover cover{&members[j], {joint_gap_mm, kTouch_mm}};
+    if (j == member || members[j].empty()) continue;
+    const Box2 box = bounds(members[j]);
+    const double reach = 2 * joint_gap_mm + kTouch_mm;
+    if (apart(own, box, reach)) continue;
+    Cover cover{&members[j],
+                {Vec2(box.min.array() - reach), Vec2(box.max.array() + reach)},
+                {joint_gap_mm, kTouch_mm}};
     if (j < member) cover.offsets_mm.push_back(-kTouch_mm);
     covers.push_back(std::move(cover));
   }

@@ -13,7 +13,7 @@ constexpr const char* kUsage =
     "  --trials N    scans a cell (default 300); the paper's method gets 12, a wrong part at most 100\n"
     "  --quick       30 scans a cell, 2 for the paper's method\n"
     "  --only WORD   cells whose name holds WORD: base, extreme, mirrored, tee, joint gap, pcl, paper "
-    "table, time;\n"
+    "table, frontier, time;\n"
     "                may be given more than once\n"
     "  --rows FILE   also write the rows to FILE as JSON (scripts/bench localize --svg FILE draws them)\n"
     "exit codes: 0 every target met, 1 not all met, 2 usage\n";
@@ -63,6 +63,7 @@ int main(int argc, char** argv) {
   }
   weldcell::bench::Book book(options);
   weldcell::bench::accuracy(book);
+  weldcell::bench::frontier(book);
   weldcell::bench::basin(book);
   weldcell::bench::latency(book);
   weldcell::bench::wrong_parts(book);

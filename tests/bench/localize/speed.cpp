@@ -1,5 +1,6 @@
 // Time against points, members and threads, and against the paper's method.
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "book.hpp"
@@ -82,30 +83,49 @@ void threads(Book& book) {
   book.add("time 2 threads / 1 thread, throughput", two / one, "x", 2, NAN, Better::None);
 }
 
-/// From 4 to 100 members, and two.
+/// The lines' distance at which a part shows about this many points.
+double pitch_for(const PartUnderTest& part, std::size_t points, std::uint64_t seed) {
+  double low = 4, high = 600;
+  for (int step = 0; step < 12; ++step) {
+    Setting s;
+    s.pitch_mm = std::sqrt(low * high);
+    (make_set(part.outline(), s, seed).edges.size() > points ? low : high) = s.pitch_mm;
+  }
+  return std::sqrt(low * high);
+}
+
+/// From 2 to 100 members: at lines 60 mm apart, where points grow with members, and at the same number of
+/// points.
 void growth_with_members(Book& book) {
+  constexpr std::size_t kSamePoints = 800;
   std::vector<workpiece::Workpiece> parts;
   for (const PartUnderTest& part : book.unseen) {
     if (part.workpiece.members.size() == 2 && parts.empty()) parts.push_back(part.workpiece);
   }
   for (const int rungs : {2, 8, 30, 98}) parts.push_back(comb(rungs));
+  double fewest_members = 0, same = 0;
   for (const workpiece::Workpiece& workpiece : parts) {
     const double start = cpu_ms();
     const PartUnderTest part = part_under_test(workpiece);
     const double offline = cpu_ms() - start;
+    const int trials = std::min(book.options.trials, 50);
     Setting s;
     s.pitch_mm = 60;
-    const Tally t =
-        run_cell(part, s, std::min(book.options.trials, 50), book.options.seed, solver_of(part, s));
+    const Tally t = run_cell(part, s, trials, book.options.seed, solver_of(part, s));
     const std::size_t points = make_set(part.outline(), s, book.options.seed).edges.size();
     const std::string name = "time " + std::to_string(part.workpiece.members.size()) + " members";
     book.add(name + " median", t.milliseconds(0.5), "ms", NAN, NAN, Better::None);
     book.add(name + " p99", t.milliseconds(0.99), "ms", NAN, NAN, Better::None);
     book.add(name + " median a point", 1e3 * t.milliseconds(0.5) / static_cast<double>(points), "us", NAN,
              NAN, Better::None);
+    s.pitch_mm = pitch_for(part, kSamePoints, book.options.seed);
+    same = run_cell(part, s, trials, book.options.seed, solver_of(part, s)).milliseconds(0.5);
+    if (fewest_members == 0) fewest_members = same;
+    book.add(name + " median at 800 points", same, "ms", NAN, NAN, Better::None);
     book.add(name + " template offline", offline, "ms", NAN, NAN, Better::None);
     book.add(name + " memory", static_cast<double>(part.localizer.memory_bytes()) / 1e6, "MB", NAN, 10);
   }
+  book.add("time 100 members / 2 members, 800 points", same / fewest_members, "x", NAN, 2);
 }
 
 }  // namespace
