@@ -10,41 +10,61 @@
 #include "weldcell/robot/egm_session.hpp"
 #include "weldcell/sim/fault_schedule.hpp"
 #include "weldcell/sim/laser.hpp"
+#include "weldcell/wire/rws_pace.hpp"
 
 namespace weldcell::app {
 
 namespace {
 
-constexpr std::uint64_t kTickCycles = 5, kRobotCycles = 12, kPersonCycles = 50, kLookCycles = 250;
+constexpr std::uint64_t kTickCycles = 5, kRobotCycles = 12, kPersonCycles = 50;
+constexpr Nanoseconds kLook = kSecond;
 
-/// The simulated controller's RWS without a socket. `session` is what the cookies name, and lies on the disk.
-class DirectTransport final : public ports::HttpTransport {
+/// The simulated controller's RWS without a socket. The thread that asks waits for its turn as the daemon's
+/// does: what it does at once here takes its time until busy() ends. `session` is what the cookies name, and
+/// lies on the disk.
+class PacedTransport final : public ports::HttpTransport {
  public:
-  DirectTransport(sim::Controller& controller, int& session) : controller_(&controller), session_(&session) {}
+  PacedTransport(sim::Controller& controller, sim::RwsLoad& load, int& session)
+      : controller_(&controller), load_(&load), session_(&session) {}
   Result<ports::HttpReply> exchange(const ports::HttpRequest& request) override {
+    time_ = time_ + pace_.wait(time_);
+    pace_.started(time_);
     if (controller_->rws_silent())
       return Error{"http.connection", request.path, "the connection was refused", "check the network"};
+    if (!load_->admit(seconds(time_.ns))) {
+      ports::HttpReply refused;
+      refused.status = 503;
+      return refused;
+    }
     return controller_->handle_rws(request, *session_);
   }
   Status logout() {
-    if (controller_->rws_silent())
+    time_ = time_ + pace_.wait(time_);
+    pace_.started(time_);
+    if (controller_->rws_silent() || !load_->admit(seconds(time_.ns)))
       return Error{"http.connection", "/logout", "the connection was refused", "check the network"};
     controller_->end_rws_session((*session_)++);
     return Done{};
   }
+  bool busy(HostTime now) const { return time_ > now; }
+  /// What follows is asked from `now` on.
+  void begin(HostTime now) { time_ = std::max(time_, now); }
 
  private:
   sim::Controller* controller_;
+  sim::RwsLoad* load_;
   int* session_;
+  wire::RwsPace pace_;
+  HostTime time_;
 };
 
 /// What ends when the process ends.
 struct Daemon {
   Daemon(const files::CellConfig& config, const VirtualJob& job, sim::Controller& controller,
-         int& rws_session)
+         sim::RwsLoad& load, int& rws_session)
       : cell(config.setup, config.laser_format, job.plc),
         session(config.setup),
-        transport(controller, rws_session),
+        transport(controller, load, rws_session),
         rws(transport,
             controller.rws_generation() == 2 ? wire::RwsGeneration::Two : wire::RwsGeneration::One),
         runner(rws, config.rws_task, job.resident_module) {
@@ -57,11 +77,12 @@ struct Daemon {
 
   job::Cell cell;
   robot::EgmSession session;
-  DirectTransport transport;
+  PacedTransport transport;
   adapters::RwsClient rws;
   RobotRunner runner;
   std::deque<job::InputBody> answers;
   std::deque<job::RobotRequest> requests;
+  std::optional<job::RobotReply> reply;  ///< told once the thread has come to it
   std::vector<std::shared_ptr<const plan::MotionPlan>> plans;
 };
 
@@ -75,6 +96,7 @@ struct VirtualCell::State {
         setup(std::make_shared<cell::CellSetup>(config_.setup)),
         controller(scene_, config_.setup.arm),
         laser(scene_),
+        rws_load(scene_.controller.rws_requests_per_s),
         faults(scene_.faults) {}
 
   void begin(bool interrupted);
@@ -95,12 +117,13 @@ struct VirtualCell::State {
   std::shared_ptr<const cell::CellSetup> setup;
   sim::Controller controller;
   sim::LaserDevice laser;
+  sim::RwsLoad rws_load;
   sim::FaultSchedule faults;
   std::unique_ptr<Daemon> daemon;
   job::SaveState saved;  ///< what a disk would hold
   int rws_session = 0;   ///< as saved
 
-  HostTime now;
+  HostTime now, next_look;
   std::uint64_t cycles = 0, jitter = 1;
   bool stalled = false;
   bool laser_up = false, rws_up = false, plc_beats = false, was_armed = true;
@@ -110,7 +133,7 @@ struct VirtualCell::State {
 };
 
 void VirtualCell::State::begin(bool interrupted) {
-  daemon = std::make_unique<Daemon>(config, job, controller, rws_session);
+  daemon = std::make_unique<Daemon>(config, job, controller, rws_load, rws_session);
   laser_up = laser.connected();
   rws_up = !controller.rws_silent();
   if (laser_up) feed(job::LinkChange{job::Link::Laser, true, {}});
@@ -209,12 +232,15 @@ void VirtualCell::State::deliver_laser() {
 void VirtualCell::State::serve_robot() {
   RobotRunner& runner = daemon->runner;
   auto& requests = daemon->requests;
+  if (daemon->transport.busy(now)) return;
+  daemon->transport.begin(now);
+  if (const auto reply = std::exchange(daemon->reply, std::nullopt)) feed(*reply);
   // As the daemon's own thread has it: a stop never waits behind a move, a move does behind a stop.
   if (!requests.empty() && (!runner.busy() || requests.front().task == job::RobotTask::Stop)) {
     runner.begin(requests.front(), now);
     requests.pop_front();
   }
-  if (const auto reply = runner.step(now)) feed(*reply);
+  daemon->reply = runner.step(now);
 }
 
 void VirtualCell::State::watch_links() {
@@ -222,7 +248,9 @@ void VirtualCell::State::watch_links() {
     laser_up = !laser_up;
     feed(job::LinkChange{job::Link::Laser, laser_up, laser_up ? "" : "closed by the sensor"});
   }
-  if (cycles % kLookCycles != 0) return;
+  if (now < next_look || daemon->transport.busy(now)) return;
+  next_look = now + kLook;
+  daemon->transport.begin(now);
   const auto state = daemon->rws.controller_state();
   if (state.ok() == rws_up) return;
   rws_up = !rws_up;
@@ -247,6 +275,7 @@ double VirtualCell::now_s() const { return seconds(state_->now.ns); }
 bool VirtualCell::finished() const { return state_->outcome.finished; }
 bool VirtualCell::daemon_runs() const { return state_->daemon != nullptr; }
 const job::CellStatus& VirtualCell::status() const { return state_->daemon->cell.status(); }
+const sim::RwsLoad& VirtualCell::rws_load() const { return state_->rws_load; }
 sim::Controller& VirtualCell::controller() { return state_->controller; }
 std::vector<sim::MotionSpan> VirtualCell::unarmed() const { return state_->unarmed; }
 

@@ -124,17 +124,25 @@ void Controller::bound_axis(std::size_t axis, double lower_rad, double upper_rad
   s.egm.set_arm(s.arm);
 }
 
+FaultSchedule::FaultSchedule(const std::vector<TimedFault>& faults) {
+  for (const TimedFault& fault : faults) add(fault, {});
+}
+
+void FaultSchedule::add(const TimedFault& fault, HostTime now) {
+  Waiting waiting{fault};
+  if (fault.after == TimedFault::After::Start) waiting.since_s = seconds(now.ns);
+  waiting_.push_back(waiting);
+}
+
 std::vector<TimedFault> FaultSchedule::due(HostTime now, const Controller& controller) {
   const double t = seconds(now.ns);
-  if (!scan_begin_s_ && controller.egm_guiding()) scan_begin_s_ = t;
-  if (!weld_begin_s_ && controller.arc_on()) weld_begin_s_ = t;
   std::vector<TimedFault> out;
-  std::erase_if(waiting_, [&](const TimedFault& fault) {
-    const std::optional<double> from = fault.after == TimedFault::After::Scan   ? scan_begin_s_
-                                       : fault.after == TimedFault::After::Weld ? weld_begin_s_
-                                                                                : std::optional(0.0);
-    if (!from || t < *from + fault.at_s) return false;
-    out.push_back(fault);
+  std::erase_if(waiting_, [&](Waiting& waiting) {
+    const bool begun =
+        waiting.fault.after == TimedFault::After::Scan ? controller.egm_guiding() : controller.arc_on();
+    if (!waiting.since_s && begun) waiting.since_s = t;
+    if (!waiting.since_s || t < *waiting.since_s + waiting.fault.at_s) return false;
+    out.push_back(waiting.fault);
     return true;
   });
   return out;

@@ -58,7 +58,8 @@ LiveCell::LiveCell(Scene scene, LiveOptions options)
       egm_(scene_.cell.egm),
       laser_outlet_(laser_outlet(scene_.cell)),
       rws_(rws_options(scene_, options_), controller_, lock_),
-      faults_(scene_.faults) {
+      faults_(scene_.faults),
+      fault_input_(options_.fault_fd) {
   if (options_.plc) {
     plc_ = std::make_unique<PlcLink>(scene_.cell.modbus, scene_.cell.word_order,
                                      PlcWorker(scene_.plc_confirm_after_s, options_.plc_rearm));
@@ -77,6 +78,7 @@ std::string LiveCell::ports_json() const {
 }
 
 void LiveCell::write_truth() {
+  const RwsLoad load = rws_.load();
   std::string text;
   {
     const std::lock_guard<std::mutex> hold(lock_);
@@ -86,7 +88,7 @@ void LiveCell::write_truth() {
       motion.begin_s += seconds(start_.ns);
       motion.end_s += seconds(start_.ns);
     }
-    text = truth_json(scene_, controller_.weld_traces(), motions);
+    text = truth_json(scene_, controller_.weld_traces(), motions, &load);
   }
   const std::string fresh = options_.truth_file + ".new";
   std::ofstream file(fresh, std::ios::binary);
@@ -98,6 +100,7 @@ void LiveCell::write_truth() {
 }
 
 void LiveCell::start_faults(HostTime now) {
+  for (const TimedFault& fault : fault_input_.take()) faults_.add(fault, now);
   for (const TimedFault& fault : faults_.due(now, controller_)) {
     std::fprintf(stderr, "weldcell-sim: fault %s for %g s\n", fault.kind.c_str(), fault.duration_s);
     if (!laser_.inject(fault.kind, fault.duration_s)) controller_.inject(fault.kind, fault.duration_s);

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "sim/egm_client.hpp"
+#include "sim/fault_input.hpp"
 #include "sim/laser_server.hpp"
 #include "sim/plc_link.hpp"
 #include "sim/rws_server.hpp"
@@ -20,6 +21,7 @@ struct LiveOptions {
   std::string truth_file;
   bool plc = true;
   bool plc_rearm = false;
+  int fault_fd = -1;             ///< whence faults are read while it runs; -1: none
   std::string certificate_file;  ///< PEM of RWS 2.0, made when absent; "" makes a new one at every start
 };
 
@@ -49,6 +51,7 @@ class LiveCell {
   std::unique_ptr<PlcLink> plc_;
   std::deque<LaserBlock> blocks_;
   FaultSchedule faults_;
+  FaultInput fault_input_;
   HostTime start_;
   std::uint64_t programs_ended_ = 0, programs_seen_ = 0;
 };

@@ -34,6 +34,7 @@ constexpr const char* kUsage =
     "pp_moved,\n"
     "                     collision, singularity, restart, rws_503 or rws_silence; e.g. "
     "laser_drop@scan+5:2\n"
+    "  --faults-from-stdin   a SPEC a line while it runs, counted from then, or from the next scan or arc\n"
     "  --no-plc           without the simulated PLC\n"
     "  --plc-rearm        the simulated worker also clears faults, arms again and resumes\n"
     "  --ports-file FILE  writes the ports in use as JSON, with the fingerprint of RWS 2.0's certificate\n"
@@ -63,6 +64,10 @@ std::optional<Options> parse(int count, char** words) {
     const std::string word = words[i];
     if (word == "--no-plc") {
       out.live.plc = false;
+      continue;
+    }
+    if (word == "--faults-from-stdin") {
+      out.live.fault_fd = 0;
       continue;
     }
     if (word == "--plc-rearm") {

@@ -256,6 +256,10 @@ RwsServer::RwsServer(RwsServerOptions options, Controller& controller, std::mute
     : state_(std::make_unique<State>(std::move(options), controller, lock)) {}
 RwsServer::~RwsServer() = default;
 int RwsServer::port() const { return state_->socket.address().port(); }
+RwsLoad RwsServer::load() const {
+  const std::lock_guard<std::mutex> hold(state_->shared.lock);
+  return state_->shared.load;
+}
 std::size_t RwsServer::sessions() const {
   const std::lock_guard<std::mutex> hold(state_->shared.lock);
   return state_->shared.sessions.count();

@@ -30,6 +30,8 @@ class RwsServer {
   RwsServer(RwsServerOptions options, Controller& controller, std::mutex& lock);
   ~RwsServer();
   int port() const;
+  /// What came so far.
+  RwsLoad load() const;
   std::size_t sessions() const;
   std::size_t subscriptions() const;
   /// SHA-256 of the certificate, "" in generation 1.

@@ -164,14 +164,6 @@ RwsAccess RwsSessions::admit(const std::string& method, const std::string& uri,
   return out;
 }
 
-bool RwsLoad::admit(double now_s) {
-  if (most_per_s_ <= 0) return true;
-  while (!times_s_.empty() && times_s_.front() <= now_s - 1) times_s_.pop_front();
-  if (static_cast<double>(times_s_.size()) >= most_per_s_) return false;
-  times_s_.push_back(now_s);
-  return true;
-}
-
 void RwsSessions::log_out(int session) { sessions_.erase(session); }
 
 std::vector<int> RwsSessions::take_expired() { return std::exchange(expired_, {}); }

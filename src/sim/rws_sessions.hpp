@@ -63,17 +63,6 @@ class RwsSessions {
   std::vector<int> expired_;
 };
 
-/// How many requests came within the last second; more than the limit are answered 503.
-class RwsLoad {
- public:
-  explicit RwsLoad(double most_per_s) : most_per_s_(most_per_s) {}
-  bool admit(double now_s);
-
- private:
-  double most_per_s_;
-  std::deque<double> times_s_;
-};
-
 /// Hexadecimal MD5 of a text.
 std::string md5_hex(const std::string& text);
 /// The items of a Digest header: Digest a="b", c=d.

@@ -157,7 +157,7 @@ std::vector<WeldedSeam> welded_seams(const Scene& scene, const std::vector<WeldT
 }
 
 std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces,
-                       const std::vector<MotionSpan>& motions) {
+                       const std::vector<MotionSpan>& motions, const RwsLoad* load) {
   nlohmann::ordered_json out;
   out["scene"] = scene.name;
   out["seed"] = scene.seed;
@@ -203,6 +203,11 @@ std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces,
   }
   out["motions_s"] = nlohmann::ordered_json::array();
   for (const MotionSpan& motion : motions) out["motions_s"].push_back({motion.begin_s, motion.end_s});
+  if (load != nullptr) {
+    out["rws_requests"] = {{"total", load->total()},
+                           {"most_in_a_second", load->most_in_a_second()},
+                           {"refused", load->refused()}};
+  }
   return out.dump(1);
 }
 

@@ -1,5 +1,6 @@
 // The arm in figures: kinematics against the reference vectors and against itself, tracking of the simulated
-// controller by the shipped RAPID module, and the limits as properties of random motions.
+// controller by the shipped RAPID module, the rate of its requests, and the limits as properties of random
+// motions.
 #include <cstdlib>
 #include <cstring>
 
@@ -48,8 +49,10 @@ int main(int argc, char** argv) {
   std::vector<bench::Row> rows;
   if (options.plans == 0) {
     bench::against_references(rows);
+    bench::against_chains(rows);
     bench::against_itself(rows);
     bench::tracking(rows, config);
+    bench::rws_rate(rows, config);
   }
   bench::random_plans(rows, config.setup, options.plans > 0 ? options.plans : 10000);
   return bench::finish("robot", rows, options.json);

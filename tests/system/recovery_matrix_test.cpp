@@ -290,6 +290,11 @@ class Recovery : public testing::TestWithParam<Case> {
     for (const std::string& seam : welded) EXPECT_EQ(welded.count(seam), 1U) << seam << " was welded twice";
   }
 
+  void never_asked_too_fast() {
+    EXPECT_GT(cell_->rws_load().total(), 50U);
+    EXPECT_LT(cell_->rws_load().most_in_a_second(), 20U) << story();
+  }
+
   void never_moved_unarmed() {
     int armed = 0, unarmed = 0;
     for (const sim::MotionSpan& motion : cell_->controller().motions()) {
@@ -306,7 +311,9 @@ class Recovery : public testing::TestWithParam<Case> {
       ++(without ? unarmed : armed);
     }
     EXPECT_GT(armed, 4) << "the arm's record is empty: nothing was shown";
-    std::printf("  %-40s motions begun armed %d, unarmed %d\n", c_.name.c_str(), armed, unarmed);
+    std::printf("  %-36s motions begun armed %d, unarmed %d; RWS requests %zu, in a second at most %zu\n",
+                c_.name.c_str(), armed, unarmed, static_cast<std::size_t>(cell_->rws_load().total()),
+                cell_->rws_load().most_in_a_second());
   }
 
   const Case& c_ = GetParam();
@@ -328,6 +335,7 @@ TEST_P(Recovery, EndsInItsStateAndGoesOnByItsStep) {
   goes_on();
   if (HasFatalFailure()) return;
   ended_well();
+  never_asked_too_fast();
   never_moved_unarmed();
 }
 

@@ -70,6 +70,8 @@ class VirtualCell {
   void set_plc_heartbeat(bool up);
 
   sim::Controller& controller();
+  /// Requests over Robot Web Services, by the controller's clock.
+  const sim::RwsLoad& rws_load() const;
   /// When the cell was not armed, a dead daemon's time included; the last stretch may last still.
   std::vector<sim::MotionSpan> unarmed() const;
 

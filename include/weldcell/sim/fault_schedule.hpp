@@ -11,13 +11,18 @@ namespace weldcell::sim {
 
 class FaultSchedule {
  public:
-  explicit FaultSchedule(std::vector<TimedFault> faults) : waiting_(std::move(faults)) {}
+  explicit FaultSchedule(const std::vector<TimedFault>& faults);
+  /// One more, counted from `now`, or from the next guided motion or arc, or the one that lasts now.
+  void add(const TimedFault& fault, HostTime now);
   /// Those whose time has come at `now`, each once. Call it every cycle: it sees the beginnings itself.
   std::vector<TimedFault> due(HostTime now, const Controller& controller);
 
  private:
-  std::vector<TimedFault> waiting_;
-  std::optional<double> scan_begin_s_, weld_begin_s_;
+  struct Waiting {
+    TimedFault fault;
+    std::optional<double> since_s = {};  ///< what its time counts from, once that has come
+  };
+  std::vector<Waiting> waiting_;
 };
 
 }  // namespace weldcell::sim

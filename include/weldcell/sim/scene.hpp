@@ -13,6 +13,7 @@
 #include "weldcell/files/fault.hpp"
 #include "weldcell/geometry/plane.hpp"
 #include "weldcell/sim/laser_truth.hpp"
+#include "weldcell/sim/rws_load.hpp"
 #include "weldcell/workpiece/workpiece.hpp"
 
 namespace weldcell::sim {
@@ -124,8 +125,8 @@ struct WeldedSeam {
 std::vector<WeldedSeam> welded_seams(const Scene& scene, const std::vector<WeldTrace>& traces);
 
 /// truth.json: pose, members, seams' true lines, latency, clocks; with traces also what was welded and how
-/// far off; when the arm moved, in seconds of the caller's clock.
+/// far off; when the arm moved, in seconds of the caller's clock; how many requests came (null: none could).
 std::string truth_json(const Scene& scene, const std::vector<WeldTrace>& traces = {},
-                       const std::vector<MotionSpan>& motions = {});
+                       const std::vector<MotionSpan>& motions = {}, const RwsLoad* load = nullptr);
 
 }  // namespace weldcell::sim

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "bench/robot/parts.hpp"
+#include "unit/kinematics/chain.hpp"
 #include "weldcell/base/units.hpp"
 
 namespace weldcell::bench {
@@ -99,6 +100,35 @@ double since_us(std::chrono::steady_clock::time_point begin) {
 }
 
 }  // namespace
+
+void against_chains(std::vector<Row>& rows) {
+  double worst_mm = 0, worst_deg = 0, rounded_mm = 0;
+  int models = 0;
+  std::mt19937_64 random(kSeed);
+  for (const fs::path& path : files_in(WELDCELL_TEST_DATA "/kinematics/chains", ".csv")) {
+    const testing::Chain chain = testing::read_chain(path);
+    const ArmModel arm = arm_of(fs::path(WELDCELL_CONFIG "/robots") / (path.stem().string() + ".yaml"));
+    ++models;
+    for (int k = 0; k < kSets; ++k) {
+      Joints q{};
+      for (std::size_t i = 0; i < 6; ++i)
+        q[i] = std::uniform_real_distribution(arm.lower[i], arm.upper[i])(random);
+      Joints serial = q;
+      if (arm.j3_j2_coupling != 0) serial[2] = q[2] - q[1];
+      const Eigen::Isometry3d theirs = testing::forward(chain, serial);
+      const auto own = kinematics::forward(arm, q);
+      const double off_mm = (own.position_mm() - theirs.translation()).norm();
+      (chain.rounded_mm > 0 ? rounded_mm : worst_mm) =
+          std::max(chain.rounded_mm > 0 ? rounded_mm : worst_mm, off_mm);
+      worst_deg = std::max(worst_deg, angle_deg(own.rotation(), theirs.linear()));
+    }
+  }
+  rows.push_back(
+      {"FK, published chains of joints: models", static_cast<double>(models), "", NAN, 12, Better::Higher});
+  rows.push_back({"FK, published chains: position, worst", worst_mm, "mm", NAN, 1e-6});
+  rows.push_back({"FK, published chains: orientation, worst", worst_deg, "deg", NAN, 1e-6});
+  rows.push_back({"FK, chain rounded to 0.5 mm (IRB 6640): position", rounded_mm, "mm", NAN, 0.5 + 1e-6});
+}
 
 void against_itself(std::vector<Row>& rows) {
   int missing = 0, sets = 0, models = 0;

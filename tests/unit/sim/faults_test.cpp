@@ -1,5 +1,8 @@
 // What befalls a controller from outside: its events, its states, and the record of what the arm did.
+#include <unistd.h>
+
 #include "fixture.hpp"
+#include "sim/fault_input.hpp"
 #include "weldcell/sim/fault_schedule.hpp"
 
 namespace weldcell::sim {
@@ -102,6 +105,49 @@ TEST(Faults, AScheduleCountsFromTheFirstArc) {
   ASSERT_EQ(due.size(), 1U);
   EXPECT_EQ(due[0].kind, "manual");
   EXPECT_TRUE(schedule.due(HostTime{9 * kSecond}, bench.controller).empty()) << "each once, and no arc yet";
+}
+
+TEST(Faults, OneThatComesLaterCountsFromThen) {
+  Scene scene = test_scene();
+  Bench bench(scene);
+  FaultSchedule schedule({});
+  schedule.add({"manual", TimedFault::After::Start, 2, 0}, HostTime{5 * kSecond});
+  EXPECT_TRUE(schedule.due(HostTime{6 * kSecond}, bench.controller).empty());
+  EXPECT_EQ(schedule.due(HostTime{7 * kSecond}, bench.controller).size(), 1U);
+}
+
+TEST(Faults, LinesAreTakenWholeAndAnythingElseIsNoFault) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const auto say = [&](const std::string& text) {
+    ASSERT_EQ(::write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  };
+  FaultInput input(ends[0]);
+  EXPECT_TRUE(input.take().empty()) << "nothing is there, and it does not wait";
+  say("estop@scan+2:3\nbang@1\n\nmanu");
+  const auto first = input.take();
+  ASSERT_EQ(first.size(), 1U);
+  EXPECT_EQ(first[0].kind, "estop");
+  EXPECT_EQ(first[0].after, TimedFault::After::Scan);
+  say("al\n");
+  const auto second = input.take();
+  ASSERT_EQ(second.size(), 1U);
+  EXPECT_EQ(second[0].kind, "manual");
+  ::close(ends[1]);
+  EXPECT_TRUE(input.take().empty());
+  ::close(ends[0]);
+}
+
+TEST(RwsLoad, CountsWhatArrivesWithinASecondRefusedOrNot) {
+  RwsLoad load(3);
+  EXPECT_TRUE(load.admit(0));
+  EXPECT_TRUE(load.admit(0.5));
+  EXPECT_TRUE(load.admit(0.9));
+  EXPECT_FALSE(load.admit(0.95));
+  EXPECT_TRUE(load.admit(1.0)) << "the first is a second old";
+  EXPECT_EQ(load.most_in_a_second(), 4U);
+  EXPECT_EQ(load.total(), 5U);
+  EXPECT_EQ(load.refused(), 1U);
 }
 
 }  // namespace weldcell::sim
