@@ -16,6 +16,7 @@ namespace {
 struct ClockPieces {
   std::vector<ClockMap> maps;
   double skew_ppm = 0, sigma_us = 0;
+  std::uint64_t left_out = 0;
 
   void close(ClockMapBuilder& builder) {
     if (builder.empty()) return;
@@ -30,9 +31,10 @@ ClockPieces map_laser(LaserClock& clock, std::span<const StampedReading> reading
   ClockPieces pieces;
   ClockMapBuilder builder;
   for (const StampedReading& r : readings) {
-    const DeviceStep step = clock.step(r.reading);
-    if (step.restarted) pieces.close(builder);
-    builder.add(step.device_ns, r.arrival);
+    const auto step = clock.step(r.reading);
+    if (!step) continue;
+    if (step->restarted) pieces.close(builder);
+    builder.add(step->device_ns, r.arrival);
   }
   pieces.close(builder);
   clock.rewind();
@@ -44,7 +46,10 @@ ClockPieces map_robot(RobotClock& clock, std::span<const StampedFeedback> poses)
   ClockMapBuilder builder;
   for (const StampedFeedback& p : poses) {
     const auto step = clock.step(p);
-    if (!step) continue;
+    if (!step) {
+      ++pieces.left_out;
+      continue;
+    }
     if (step->restarted) pieces.close(builder);
     builder.add(step->device_ns, p.arrival);
   }
@@ -119,19 +124,32 @@ std::vector<SurfacePoint> align(const cell::CellSetup& cell, std::span<const Sta
     if (!pieces->maps.empty()) summary.clock_resets += pieces->maps.size() - 1;
   }
 
+  summary.repeated = robot.left_out;
+  if (readings.size() > 1 && readings.back().arrival > readings.front().arrival) {
+    const std::uint32_t sent = readings.back().reading.counter - readings.front().reading.counter;
+    summary.laser_rate_hz = sent / seconds(readings.back().arrival - readings.front().arrival);
+  }
+
   points.reserve(readings.size());
   const Nanoseconds latency = from_seconds(cell.laser.latency_ms * 1e-3);
   std::size_t piece = 0;
   std::uint64_t missing = 0;
+  bool stalled = false;
   double height_mm = cell.table.z_mm;
   HostTime last{std::numeric_limits<Nanoseconds>::min()};
   Beam beam;
   for (const StampedReading& r : readings) {
-    const DeviceStep step = laser_clock.step(r.reading);
-    if (step.restarted) ++piece;
-    summary.lost += step.lost;
-    missing += step.lost;
-    const HostTime time = laser.maps[piece].to_host(step.device_ns) - latency;
+    const auto step = laser_clock.step(r.reading);
+    if (!step) {
+      ++summary.repeated;
+      continue;
+    }
+    if (step->restarted) ++piece;
+    if (step->stalled && !stalled) ++summary.clock_stalls;
+    stalled = step->stalled;
+    summary.lost += step->lost;
+    missing += step->lost;
+    const HostTime time = laser.maps[piece].to_host(step->device_ns) - latency;
     if (time <= last || !beams.at(time, beam)) {
       ++summary.without_pose;
       ++missing;

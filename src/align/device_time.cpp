@@ -12,6 +12,8 @@ constexpr double kStepToleranceNs = 2e6;  // stamps and numbers that part by mor
 constexpr double kStepToleranceShare = 0.01;
 constexpr Nanoseconds kReorder = 100 * kMillisecond;
 constexpr Nanoseconds kRobotStep = kSecond;
+// Less could be the controller's own jitter between measuring and sending.
+constexpr double kRobotStepToleranceNs = 6e6;
 
 std::int32_t difference(std::uint32_t later, std::uint32_t earlier) {
   return static_cast<std::int32_t>(later - earlier);
@@ -41,7 +43,7 @@ LaserClock::LaserClock(std::span<const StampedReading> readings, double rate_hz)
   }
 }
 
-DeviceStep LaserClock::step(const wire::LaserReading& reading) {
+std::optional<DeviceStep> LaserClock::step(const wire::LaserReading& reading) {
   DeviceStep out;
   const std::int32_t numbers = difference(reading.counter, last_counter_);
   const std::int32_t stamps = difference(reading.timestamp_us, last_timestamp_us_);
@@ -53,19 +55,22 @@ DeviceStep LaserClock::step(const wire::LaserReading& reading) {
     out.device_ns = device_ns_;
     return out;
   }
+  // One of the two may stand still while the other carries the time; both at once are the same reading again.
+  const bool by_stamps = has_timestamp_ && stamps != 0, by_numbers = has_counter_ && numbers != 0;
+  if (!by_stamps && !by_numbers && (has_timestamp_ || has_counter_)) return std::nullopt;
   const double by_stamp = 1e3 * stamps, by_number = period_ns_ * numbers;
-  if (has_timestamp_ && stamps <= 0) out.restarted = true;
-  if (has_counter_ && numbers <= 0) out.restarted = true;
-  if (has_timestamp_ && has_counter_ &&
+  out.stalled = has_timestamp_ && !by_stamps;
+  if ((by_stamps && stamps < 0) || (by_numbers && numbers < 0)) out.restarted = true;
+  if (by_stamps && by_numbers &&
       std::abs(by_stamp - by_number) > kStepToleranceNs + kStepToleranceShare * std::abs(by_number)) {
     out.restarted = true;
   }
   if (out.restarted) {
     device_ns_ = 0;
   } else {
-    const double advance = has_timestamp_ ? by_stamp : (has_counter_ ? by_number : period_ns_);
+    const double advance = by_stamps ? by_stamp : (by_numbers ? by_number : period_ns_);
     device_ns_ += static_cast<std::int64_t>(std::llround(advance));
-    const double periods = has_counter_ ? numbers : std::round(by_stamp / period_ns_);
+    const double periods = by_numbers ? numbers : std::round(by_stamp / period_ns_);
     out.lost = static_cast<std::uint32_t>(std::max(0.0, periods - 1));
   }
   out.device_ns = device_ns_;
@@ -98,6 +103,7 @@ Nanoseconds send_age(std::span<const StampedFeedback> poses) {
 RobotClock::RobotClock(std::span<const StampedFeedback> poses) {
   has_time_ = std::all_of(poses.begin(), poses.end(), [](const auto& p) { return p.feedback.time_us >= 0; });
   if (has_time_) send_age_ns_ = send_age(poses);
+  find_period(poses);
   if (has_time_ || poses.size() < 3) return;
   seqno_zero_ = poses.front().feedback.seqno;
   tm_zero_ms_ = poses.front().feedback.tm_ms;
@@ -122,6 +128,22 @@ RobotClock::RobotClock(std::span<const StampedFeedback> poses) {
   }
 }
 
+void RobotClock::find_period(std::span<const StampedFeedback> poses) {
+  std::vector<double> periods;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const auto &a = poses[i - 1].feedback, &b = poses[i].feedback;
+    const double numbers = difference(b.seqno, a.seqno);
+    const double advance =
+        has_time_ ? 1e3 * static_cast<double>(b.time_us - a.time_us) : 1e6 * difference(b.tm_ms, a.tm_ms);
+    if (numbers > 0 && advance > 0) periods.push_back(advance / numbers);
+  }
+  // With a number that is no count of cycles there is nothing to hold the clock against.
+  if (periods.empty() || 2 * periods.size() < poses.size()) return;
+  const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
+  std::nth_element(periods.begin(), middle, periods.end());
+  period_ns_ = *middle;
+}
+
 std::int64_t RobotClock::raw_ns(const wire::EgmFeedback& feedback) const {
   if (has_time_) return feedback.time_us * kMicrosecond;
   if (tm_period_ns_ > 0) {
@@ -137,9 +159,17 @@ std::optional<DeviceStep> RobotClock::step(const StampedFeedback& pose) {
   if (!first_) {
     const Nanoseconds advance = out.device_ns - device_ns_;
     if (advance <= 0 && advance > -kReorder) return std::nullopt;
-    out.restarted = advance < 0 || std::abs(advance - (pose.arrival.ns - arrival_ns_)) > kRobotStep;
+    const Nanoseconds beside_arrival = std::abs(advance - (pose.arrival.ns - arrival_ns_));
+    const std::int32_t numbers = difference(pose.feedback.seqno, seqno_);
+    const double beside_number = std::abs(static_cast<double>(advance) - period_ns_ * numbers);
+    const bool counted = period_ns_ > 0 && numbers > 0 &&
+                         beside_number > kRobotStepToleranceNs + kStepToleranceShare * period_ns_ * numbers;
+    // A pause in sending parts clock and count, but not clock and arrival.
+    out.restarted = advance < 0 || beside_arrival > kRobotStep ||
+                    (counted && static_cast<double>(beside_arrival) > kRobotStepToleranceNs / 2);
   }
   first_ = false;
+  seqno_ = pose.feedback.seqno;
   device_ns_ = out.device_ns;
   arrival_ns_ = pose.arrival.ns;
   return out;

@@ -68,6 +68,9 @@ struct Daemon {
         rws(transport,
             controller.rws_generation() == 2 ? wire::RwsGeneration::Two : wire::RwsGeneration::One),
         runner(rws, config.rws_task, job.resident_module) {
+    job::CellMemory memory = cell.memory();
+    memory.watches_latency = true;
+    cell.recall(memory);
     if (rws_session == 0) {
       rws_session = 1;
     } else {

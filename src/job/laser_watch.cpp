@@ -25,16 +25,21 @@ bool Cell::latency_beyond() const {
 void Cell::watch_laser() {
   char text[240];
   const align::AlignSummary& align = solution_->evidence.align;
-  if (std::abs(align.laser_skew_ppm) > kMostSkew_ppm && scan_ && scan_->readings.size() > 1) {
-    const auto& first = scan_->readings.front();
-    const auto& last = scan_->readings.back();
-    const double span_s = seconds(last.arrival - first.arrival);
-    const double sent = static_cast<double>(last.reading.counter - first.reading.counter);
+  if (align.clock_resets + align.clock_stalls > 0) {
+    std::snprintf(text, sizeof text,
+                  "in this scan a clock of laser or robot was set or began anew (%llu), or the laser's stood "
+                  "still (%llu): "
+                  "each stretch was aligned by itself",
+                  static_cast<unsigned long long>(align.clock_resets),
+                  static_cast<unsigned long long>(align.clock_stalls));
+    log(LogEvent::Level::Warning, text);
+  }
+  if (std::abs(align.laser_skew_ppm) > kMostSkew_ppm) {
     std::snprintf(
         text, sizeof text,
-        "the laser sent some %.0f readings a second, laser.rate_hz says %.0f: readings are placed wrongly; "
+        "the laser sent some %.1f readings a second, laser.rate_hz says %g: readings are placed wrongly; "
         "correct laser.rate_hz or the sensor's rate",
-        span_s > 0 ? sent / span_s : 0, setup_.laser.rate_hz);
+        align.laser_rate_hz, setup_.laser.rate_hz);
     log(LogEvent::Level::Warning, text);
   }
   if (!solution_->found.latency_s || solution_->verdict.verdict != localize::Verdict::Weld) return;

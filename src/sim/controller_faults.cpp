@@ -110,6 +110,10 @@ bool Controller::inject(const std::string& fault, double duration_s) {
     s.restart(duration_s);
   } else if (fault == "egm_silence" || fault == "rws_503" || fault == "rws_silence") {
     s.fault_until_s[fault] = until;
+  } else if (fault == "robot_clock_step" || fault == "robot_clock_back") {
+    // Somebody sets the controller's clock.
+    const double by_s = duration_s > 0 ? duration_s : 1;
+    s.truth.clock.offset_s += fault == "robot_clock_step" ? by_s : -by_s;
   } else {
     return false;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "sim/laser_light.hpp"
 #include "sim/laser_wire.hpp"
@@ -88,10 +89,23 @@ struct LaserDevice::State {
     const double device_s = static_cast<double>(k) / setup.rate_hz;
     return {static_cast<Nanoseconds>(std::llround(device_s / (1 + truth.clock.drift_ppm * 1e-6) * 1e9))};
   }
-  std::uint64_t clock_ns(HostTime t) const {
+  std::int64_t free_clock_ns(HostTime t) const {
     const double device_s = truth.clock.offset_s + seconds(t.ns) * (1 + truth.clock.drift_ppm * 1e-6);
-    return static_cast<std::uint64_t>(std::floor(device_s * 1e9));
+    return static_cast<std::int64_t>(std::floor(device_s * 1e9));
   }
+  /// As the sensor's clock shows it, whatever was done to it.
+  std::uint64_t clock_ns(HostTime t) {
+    const std::int64_t free = free_clock_ns(t) + clock_shift_ns;
+    if (t < clock_stands_until) {
+      if (clock_stands_ns < 0) clock_stands_ns = free;
+      return static_cast<std::uint64_t>(clock_stands_ns);
+    }
+    if (clock_stands_ns < 0) return static_cast<std::uint64_t>(free);
+    clock_shift_ns -= free - clock_stands_ns;
+    const std::int64_t from = std::exchange(clock_stands_ns, -1);
+    return static_cast<std::uint64_t>(from + 1000);
+  }
+  bool meddle_with_clock(const std::string& fault, double by_s);
 
   double speckle(double x_mm, double y_mm) const;
   bool only_table(const Eigen::Vector3d& at_table, const Eigen::Vector3d& at_top, const Eigen::Vector3d& eye);
@@ -119,7 +133,9 @@ struct LaserDevice::State {
   std::size_t per_block = 20;
   std::uint64_t next = 0;
   std::vector<Sample> block;
-  HostTime last_arrival, drop_until, stall_until;
+  HostTime last_arrival, drop_until, stall_until, clock_stands_until;
+  std::int64_t clock_shift_ns = 0, clock_stands_ns = -1;
+  std::uint64_t number_zero = 0;  ///< exposures before the running number began
   HostTime now;
 };
 
@@ -289,7 +305,7 @@ std::vector<LaserBlock> LaserDevice::advance(HostTime now, const PoseAt& pose_at
   s.now = now;
   for (HostTime t = s.instant(s.next); t <= now; t = s.instant(s.next)) {
     Sample sample = s.measure(s.next, t, pose_at);
-    sample.number = s.next;
+    sample.number = s.next - s.number_zero;
     sample.device_ns = s.clock_ns(t + from_seconds(s.truth.latency_ms * 1e-3));
     s.block.push_back(sample);
     ++s.next;
@@ -304,6 +320,23 @@ bool LaserDevice::inject(const std::string& fault, double duration_s) {
     state_->drop_until = until;
   } else if (fault == "laser_stall") {
     state_->stall_until = until;
+  } else {
+    return state_->meddle_with_clock(fault, duration_s);
+  }
+  return true;
+}
+
+bool LaserDevice::State::meddle_with_clock(const std::string& fault, double by_s) {
+  const Nanoseconds by = from_seconds(by_s > 0 ? by_s : 1);
+  if (fault == "laser_clock_step") {
+    clock_shift_ns += by;
+  } else if (fault == "laser_clock_back") {
+    clock_shift_ns -= by;
+  } else if (fault == "laser_clock_stop") {
+    clock_stands_until = now + by;
+  } else if (fault == "laser_clock_reset") {
+    clock_shift_ns = -free_clock_ns(now);
+    number_zero = next;
   } else {
     return false;
   }

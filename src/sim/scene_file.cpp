@@ -17,10 +17,13 @@ using files::Map;
 using files::Need;
 using files::Node;
 
-const std::vector<std::string> kKinds{"laser_drop",   "laser_stall", "egm_silence", "estop",
-                                      "guardstop",    "motors_off",  "motors_on",   "manual",
-                                      "program_stop", "pp_moved",    "collision",   "singularity",
-                                      "restart",      "rws_503",     "rws_silence"};
+const std::vector<std::string> kKinds{
+    "laser_drop",       "laser_stall",      "egm_silence",       "estop",
+    "guardstop",        "motors_off",       "motors_on",         "manual",
+    "program_stop",     "pp_moved",         "collision",         "singularity",
+    "restart",          "rws_503",          "rws_silence",       "laser_clock_step",
+    "laser_clock_back", "laser_clock_stop", "laser_clock_reset", "robot_clock_step",
+    "robot_clock_back"};
 
 constexpr files::Choice<Finish> kFinishes[] = {{"ideal", Finish::Ideal},
                                                {"mill_scale", Finish::MillScale},

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 namespace weldcell::wire {
@@ -12,6 +11,8 @@ constexpr std::size_t kHeaderBytes = 28;
 constexpr std::uint32_t kPreamble = 0x4D454153;
 constexpr std::uint32_t kCounterMask = 0xFFFFFF;
 constexpr double kMmPerCount = 1e-6;
+/// Frames of a block that are looked at for the right count behind a damaged one.
+constexpr std::uint32_t kLookAhead = 32;
 /// A count farther ahead than this is a restarted sensor, not a loss: 3.5 minutes at 5 kHz.
 constexpr std::uint32_t kLongestGap = 1U << 20;
 
@@ -118,28 +119,8 @@ void Meas28Decoder::reset() {
   counters_ = kept;
 }
 
-std::span<const std::byte> Meas28Decoder::take(std::span<const std::byte> bytes) noexcept {
-  if (end_ + bytes.size() > buffer_.size()) {
-    std::memmove(buffer_.data(), buffer_.data() + last_item_, end_ - last_item_);
-    begin_ -= last_item_;
-    end_ -= last_item_;
-    last_item_ = 0;
-  }
-  const std::size_t fitting = std::min(bytes.size(), buffer_.size() - end_);
-  std::memcpy(buffer_.data() + end_, bytes.data(), fitting);
-  end_ += fitting;
-  return bytes.subspan(fitting);
-}
-
-bool Meas28Decoder::next(LaserReading& out) noexcept {
-  for (;;) {
-    const Step step = searching_ ? search() : frames_left_ == 0 ? take_header() : take_frame(out);
-    if (step != Step::Again) return step == Step::Reading;
-  }
-}
-
-bool Meas28Decoder::read_header(std::size_t at, Header& out) noexcept {
-  const std::byte* p = buffer_.data() + at;
+bool Meas28Decoder::read_header(Header& out) noexcept {
+  const std::byte* p = front();
   if (read_u32(p) != kPreamble) return false;
   const std::uint16_t first = read_u16(p + 20), second = read_u16(p + 22);
   const bool frames_first = second == frame_bytes_ && size_order_ != SizeOrder::BytesFirst;
@@ -151,26 +132,18 @@ bool Meas28Decoder::read_header(std::size_t at, Header& out) noexcept {
   return true;
 }
 
-Meas28Decoder::Step Meas28Decoder::search() noexcept {
-  while (end_ - begin_ >= kHeaderBytes) {
-    if (Header header; read_header(begin_, header)) {
-      searching_ = false;
-      return Step::Again;
-    }
-    ++begin_;
-    ++counters_.skipped_bytes;
-    last_item_ = begin_;
-  }
-  return Step::NeedMore;
+bool Meas28Decoder::header_here() noexcept {
+  Header header;
+  return read_header(header);
 }
 
-Meas28Decoder::Step Meas28Decoder::take_header() noexcept {
-  if (end_ - begin_ < kHeaderBytes) return Step::NeedMore;
-  if (!read_header(begin_, block_)) {
+auto Meas28Decoder::take_header() noexcept -> Step {
+  if (size() < header_bytes()) return Step::NeedMore;
+  if (!read_header(block_)) {
     lose_sync();
     return Step::Again;
   }
-  consume(kHeaderBytes);
+  consume(header_bytes());
   frames_left_ = block_.frames;
   ++counters_.blocks;
   if (!layout_.counter && block_.frames > 0) {
@@ -179,23 +152,33 @@ Meas28Decoder::Step Meas28Decoder::take_header() noexcept {
   return Step::Again;
 }
 
-Meas28Decoder::Step Meas28Decoder::take_frame(LaserReading& out) noexcept {
-  if (end_ - begin_ < frame_bytes_) return Step::NeedMore;
-  if (read_u32(buffer_.data() + begin_) == kPreamble) {
-    if (end_ - begin_ < kHeaderBytes) return Step::NeedMore;
-    if (Header header; read_header(begin_, header)) {
+auto Meas28Decoder::take_frame(LaserReading& out) noexcept -> Step {
+  if (size() < frame_bytes_) return Step::NeedMore;
+  if (read_u32(front()) == kPreamble) {
+    if (size() < header_bytes()) return Step::NeedMore;
+    if (header_here()) {
       // The block before was cut short: its missing frames show in the count.
       ++counters_.resyncs;
       frames_left_ = 0;
       return Step::Again;
     }
   }
-  const std::byte* p = buffer_.data() + begin_ + (layout_.exposure ? 4 : 0);
+  const std::byte* p = front() + (layout_.exposure ? 4 : 0);
   std::uint32_t number = next_counter_;
   if (layout_.counter) {
+    const bool first = frames_left_ == block_.frames;
+    std::uint32_t outvoted = 0;
+    if (first && !offset_confirmed_) {
+      if (size() < std::min<std::size_t>(frames_left_, 3) * frame_bytes_) return Step::NeedMore;
+      if (followers_agree(outvoted) && outvoted != read_u32(p)) return pass_damaged_frame(outvoted);
+    }
+    const bool rival_known = rival_known_;
+    const std::uint32_t rival_offset = rival_offset_;
     if (!accept_number(read_u32(p), number)) {
-      lose_sync();
-      return Step::Again;
+      const Step step = pass_damaged_frame(first ? (block_.counter + offset_) & kCounterMask : next_counter_);
+      // Looked at again when more has come, it must not be its own witness.
+      if (step == Step::NeedMore) rival_known_ = rival_known, rival_offset_ = rival_offset;
+      return step;
     }
     p += 4;
   }
@@ -216,6 +199,42 @@ Meas28Decoder::Step Meas28Decoder::take_frame(LaserReading& out) noexcept {
   ++counters_.readings;
   consume(frame_bytes_);
   return Step::Reading;
+}
+
+/// The count of the frame at the front by the two behind it, where those agree.
+bool Meas28Decoder::followers_agree(std::uint32_t& number) const noexcept {
+  const std::size_t at = layout_.exposure ? 4 : 0;
+  if (frames_left_ < 3 || size() < 2 * frame_bytes_ + at + 4) return false;
+  number = (read_u32(front() + frame_bytes_ + at) - 1) & kCounterMask;
+  return number == ((read_u32(front() + 2 * frame_bytes_ + at) - 2) & kCounterMask);
+}
+
+auto Meas28Decoder::pass_damaged_frame(std::uint32_t expected) noexcept -> Step {
+  // Nothing but the count may be damaged: then a frame farther on in the block has the right one, or the next
+  // header stands where this block ends. At the beginning of a block the header's count may be the damaged
+  // one: its end tells nothing then.
+  const bool first = frames_left_ == block_.frames;
+  const std::size_t count_at = layout_.exposure ? 4 : 0;
+  const std::uint32_t last = std::min(first ? frames_left_ - 1 : frames_left_, kLookAhead);
+  bool right = false;
+  for (std::uint32_t j = 1; j <= last && !right; ++j) {
+    const bool end = j == frames_left_;
+    const std::size_t at = j * frame_bytes_ + (end ? 0 : count_at);
+    if (size() < at + 4) return Step::NeedMore;
+    right = read_u32(front() + at) == (end ? kPreamble : (expected + j) & kCounterMask);
+  }
+  if (!right) {
+    lose_sync();
+    return Step::Again;
+  }
+  ++counters_.resyncs;
+  ++counters_.lost_readings;
+  counters_.skipped_bytes += frame_bytes_;
+  next_counter_ = (first ? unwrap(expected, kCounterMask) : next_counter_) + 1;
+  numbering_ = true;
+  --frames_left_;
+  consume(frame_bytes_);
+  return Step::Again;
 }
 
 bool Meas28Decoder::accept_number(std::uint32_t word, std::uint32_t& number) noexcept {
@@ -247,20 +266,6 @@ std::uint32_t Meas28Decoder::unwrap(std::uint32_t number, std::uint32_t mask) no
   }
   counters_.lost_readings += ahead;
   return next_counter_ + ahead;
-}
-
-void Meas28Decoder::lose_sync() noexcept {
-  ++counters_.resyncs;
-  frames_left_ = 0;
-  searching_ = true;
-  // Missing bytes may have made the last item swallow the beginning of the next header.
-  if (last_item_ < begin_) begin_ = last_item_ + 1;
-  last_item_ = begin_;
-}
-
-void Meas28Decoder::consume(std::size_t bytes) noexcept {
-  last_item_ = begin_;
-  begin_ += bytes;
 }
 
 std::size_t encode_meas28(const Meas28Layout& layout, std::span<const LaserReading> readings,

@@ -1,7 +1,5 @@
 // Data28 and Meas32: blocks of a header and frames of 32-bit words.
-#include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "weldcell/wire/laser_dialects.hpp"
 
@@ -32,27 +30,6 @@ void LaserBlockDecoder::reset() {
   counters_ = kept;
 }
 
-std::span<const std::byte> LaserBlockDecoder::take(std::span<const std::byte> bytes) noexcept {
-  if (end_ + bytes.size() > buffer_.size()) {
-    std::memmove(buffer_.data(), buffer_.data() + last_item_, end_ - last_item_);
-    begin_ -= last_item_;
-    moved_ += last_item_;
-    end_ -= last_item_;
-    last_item_ = 0;
-  }
-  const std::size_t fitting = std::min(bytes.size(), buffer_.size() - end_);
-  std::memcpy(buffer_.data() + end_, bytes.data(), fitting);
-  end_ += fitting;
-  return bytes.subspan(fitting);
-}
-
-bool LaserBlockDecoder::next(LaserReading& out) noexcept {
-  for (;;) {
-    const Step step = searching_ ? search() : frames_left_ == 0 ? take_header() : take_frame(out);
-    if (step != Step::Again) return step == Step::Reading;
-  }
-}
-
 bool LaserBlockDecoder::may_be_header(const std::byte* p) const noexcept {
   return little(p) == (format_.dialect == LaserDialect::Data28 ? kData : kMeas);
 }
@@ -72,30 +49,18 @@ bool LaserBlockDecoder::read_header(const std::byte* p, Header& out) const noexc
   return (at(p, 26) | at(p, 27) << 8) == frame_bytes_;
 }
 
-LaserBlockDecoder::Step LaserBlockDecoder::search() noexcept {
-  while (end_ - begin_ >= header_bytes_) {
-    const std::byte* p = buffer_.data() + begin_;
-    Header header;
-    if (read_header(p, header)) {
-      searching_ = false;
-      after_search_ = true;
-      return Step::Again;
-    }
-    ++begin_;
-    ++counters_.skipped_bytes;
-    last_item_ = begin_;
-  }
-  return Step::NeedMore;
+bool LaserBlockDecoder::header_here() const noexcept {
+  Header header;
+  return read_header(front(), header);
 }
 
-LaserBlockDecoder::Step LaserBlockDecoder::take_header() noexcept {
-  if (end_ - begin_ < header_bytes_) return Step::NeedMore;
-  if (!read_header(buffer_.data() + begin_, block_)) {
+auto LaserBlockDecoder::take_header() noexcept -> Step {
+  if (size() < header_bytes_) return Step::NeedMore;
+  if (!read_header(front(), block_)) {
     lose_sync();
     return Step::Again;
   }
-  last_item_ = begin_;
-  begin_ += header_bytes_;
+  consume(header_bytes_);
   frames_left_ = block_.frames;
   dropping_ = block_.frames > 0 && !accept_count();
   if (dropping_) {
@@ -109,8 +74,7 @@ LaserBlockDecoder::Step LaserBlockDecoder::take_header() noexcept {
 
 bool LaserBlockDecoder::accept_count() noexcept {
   const std::uint32_t counter = block_.counter, ahead = counter - next_counter_;
-  const std::uint64_t place = moved_ + begin_;
-  const std::uint64_t passed = counter - trusted_counter_, room = place - trusted_place_;
+  const std::uint64_t passed = counter - trusted_counter_, room = place() - trusted_place_;
   // No more readings can have gone by than the bytes since the last trusted header had room for; where no
   // byte is missing, whole headers are what remains beside the frames.
   const bool fits = passed <= room / frame_bytes_ + 1;
@@ -135,7 +99,7 @@ bool LaserBlockDecoder::accept_count() noexcept {
   doubted_ = !goes_on && !rival;
   if (goes_on || !settled_) {
     trusted_counter_ = counter;
-    trusted_place_ = place;
+    trusted_place_ = place();
   }
   settled_ = settled_ || (numbering_ && goes_on);
   numbering_ = true;
@@ -143,19 +107,20 @@ bool LaserBlockDecoder::accept_count() noexcept {
   return true;
 }
 
-LaserBlockDecoder::Step LaserBlockDecoder::look_for_header() noexcept {
+auto LaserBlockDecoder::look_for_header() noexcept -> Step {
   // A header inside a block: the block was cut short, or its frame count is damaged. A preamble may begin in
   // the frame before.
-  const std::size_t from = frames_left_ < block_.frames ? begin_ - 3 : begin_;
-  const std::size_t last = begin_ + frame_bytes_ - 4;
-  for (std::size_t i = from; i <= last; ++i) {
-    if (!may_be_header(buffer_.data() + i)) continue;
-    if (end_ - i < header_bytes_) return Step::NeedMore;
-    if (Header header; read_header(buffer_.data() + i, header)) {
+  const std::ptrdiff_t from = frames_left_ < block_.frames ? -3 : 0;
+  const std::ptrdiff_t last = static_cast<std::ptrdiff_t>(frame_bytes_) - 4;
+  for (std::ptrdiff_t i = from; i <= last; ++i) {
+    if (!may_be_header(front() + i)) continue;
+    if (static_cast<std::ptrdiff_t>(size()) - i < static_cast<std::ptrdiff_t>(header_bytes_))
+      return Step::NeedMore;
+    if (Header header; read_header(front() + i, header)) {
       // Its missing frames show in the count.
       ++counters_.resyncs;
-      counters_.skipped_bytes += i > begin_ ? i - begin_ : 0;
-      begin_ = last_item_ = i;
+      counters_.skipped_bytes += i > 0 ? static_cast<std::uint64_t>(i) : 0;
+      leave(i);
       frames_left_ = 0;
       after_search_ = true;
       break;
@@ -164,14 +129,13 @@ LaserBlockDecoder::Step LaserBlockDecoder::look_for_header() noexcept {
   return Step::Again;
 }
 
-LaserBlockDecoder::Step LaserBlockDecoder::take_frame(LaserReading& out) noexcept {
-  if (end_ - begin_ < frame_bytes_) return Step::NeedMore;
+auto LaserBlockDecoder::take_frame(LaserReading& out) noexcept -> Step {
+  if (size() < frame_bytes_) return Step::NeedMore;
   if (const Step step = look_for_header(); step == Step::NeedMore) return step;
   if (frames_left_ == 0) return Step::Again;
-  const std::byte* p = buffer_.data() + begin_;
+  const std::byte* p = front();
   --frames_left_;
-  last_item_ = begin_;
-  begin_ += frame_bytes_;
+  consume(frame_bytes_);
   if (dropping_) {
     counters_.skipped_bytes += frame_bytes_;
     return Step::Again;
@@ -198,15 +162,6 @@ void LaserBlockDecoder::read_frame(const std::byte* p, LaserReading& out) const 
   if (out.code == 0 && part < -0.01) out.code = kLaserBelowScale;
   if (out.code == 0 && part > 1.01) out.code = kLaserAboveScale;
   if (out.code == 0) out.distance_mm = static_cast<float>(part * format_.range_mm + format_.offset_mm);
-}
-
-void LaserBlockDecoder::lose_sync() noexcept {
-  ++counters_.resyncs;
-  frames_left_ = 0;
-  searching_ = true;
-  // Missing bytes may have made the last item swallow the beginning of the next header.
-  if (last_item_ < begin_) begin_ = last_item_ + 1;
-  last_item_ = begin_;
 }
 
 }  // namespace weldcell::wire

@@ -19,17 +19,16 @@ std::string joined(const std::vector<std::string>& parts) {
   return out;
 }
 
-/// Without what cannot stand in a message.
+}  // namespace
+
 std::string readable(const std::string& text) {
   std::string out;
-  for (const char c : text.substr(0, 120)) {
+  for (const char c : text.substr(0, 200)) {
     const bool plain = c >= 0x20 && c < 0x7F;
     if (plain || (!out.empty() && out.back() != ' ')) out += plain ? c : ' ';
   }
   return out;
 }
-
-}  // namespace
 
 std::string number_text(double value) {
   char text[32];
@@ -76,9 +75,15 @@ std::optional<Error> LaserSetup::fault() const {
   return Error{"laser.mismatch", device_, joined(differences_), joined(mends_)};
 }
 
+void LaserSetup::name_device(const std::string& name) {
+  device_ = wanted_.device + " (" + readable(name) + ")";
+}
+
+void LaserSetup::note(const std::string& text) { notes_.push_back(readable(text)); }
+
 void LaserSetup::differs(const std::string& setting, const std::string& configured, const std::string& found,
                          const std::string& mend) {
-  differences_.push_back(setting + " is " + configured + ", the sensor has " + found);
+  differences_.push_back(setting + " is " + configured + ", the sensor has " + readable(found));
   if (std::find(mends_.begin(), mends_.end(), mend) == mends_.end()) mends_.push_back(mend);
 }
 

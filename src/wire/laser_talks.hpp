@@ -20,6 +20,8 @@ std::unique_ptr<LaserSetup> ild1402_talk(const LaserWanted& wanted);
 /// UDP reads and writes of the OD5000.
 std::unique_ptr<LaserSetup> od5000_talk(const LaserWanted& wanted);
 
+/// Without what cannot stand in a message, and no longer than one.
+std::string readable(const std::string& text);
 /// As a message shows it.
 std::string number_text(double value);
 

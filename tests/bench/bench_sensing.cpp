@@ -4,6 +4,7 @@
 #include <random>
 
 #include "bench/rows.hpp"
+#include "bench/sensing/parts.hpp"
 #include "unit/edges/step_profile.hpp"
 #include "unit/wire/laser_streams.hpp"
 #include "weldcell/align/clock_map.hpp"
@@ -18,8 +19,6 @@ using bench::Row;
 using edges::StepProfile;
 
 constexpr std::uint64_t kSeed = 47001;
-
-double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 edges::EdgeOptions options_for(const StepProfile& p, edges::Method method) {
   edges::EdgeOptions o;
@@ -183,68 +182,6 @@ void clock_rows(std::vector<Row>& rows) {
       {"stated time uncertainty (2 sigma) covers", 100.0 * covered / kTrials, "%", NAN, 95, Better::Higher});
 }
 
-void speed_rows(std::vector<Row>& rows) {
-  constexpr std::uint32_t kRate = 50000, kBlock = 100;
-  constexpr double kDuration = 20;
-  cell::CellSetup cell;
-  cell.arm.a1 = 150, cell.arm.a2 = -115, cell.arm.c1 = 445, cell.arm.c2 = 700, cell.arm.c3 = 795,
-  cell.arm.c4 = 85;
-  cell.arm.offset[2] = rad(-90);
-  cell.laser.rate_hz = kRate;
-  const wire::Meas28Layout layout;
-  std::vector<std::byte> bytes;
-  std::vector<std::size_t> block_end;
-  std::vector<wire::LaserReading> block(kBlock);
-  const auto total = static_cast<std::uint32_t>(kRate * kDuration);
-  for (std::uint32_t k = 0; k < total; k += kBlock) {
-    for (std::uint32_t i = 0; i < kBlock; ++i) {
-      block[i].distance_mm = 100.0F + 0.01F * static_cast<float>((k + i) % 17);
-      block[i].counter = k + i;
-      block[i].timestamp_us = 1'000'000 + (k + i) * 20;
-    }
-    const std::size_t at = bytes.size();
-    bytes.resize(at + 28 + kBlock * layout.frame_bytes());
-    bytes.resize(at + wire::encode_meas28(layout, block, 1, 2, std::span(bytes).subspan(at)));
-    block_end.push_back(bytes.size());
-  }
-  std::vector<align::StampedFeedback> poses;
-  for (int k = 0; k * 4e-3 < kDuration + 0.1; ++k) {
-    align::StampedFeedback p;
-    p.feedback.joints_deg = {10 * std::sin(0.7 * k * 4e-3), 20, 15, 0, 55, 0};
-    p.feedback.seqno = static_cast<std::uint32_t>(k);
-    p.feedback.time_us = 4000LL * k;
-    p.arrival = HostTime{4 * kMillisecond * k};
-    poses.push_back(p);
-  }
-  const double start = cpu_seconds();
-  std::vector<align::StampedReading> readings;
-  readings.reserve(total);
-  wire::Meas28Decoder decoder(layout);
-  std::size_t from = 0;
-  for (std::size_t b = 0; b < block_end.size(); ++b) {
-    const HostTime arrival{static_cast<Nanoseconds>(b + 1) * 2 * kMillisecond};
-    decoder.feed(std::span(bytes).subspan(from, block_end[b] - from), [&](const wire::LaserReading& r) {
-      readings.push_back({arrival, r});
-    });
-    from = block_end[b];
-  }
-  const double decoded = cpu_seconds();
-  align::AlignSummary summary;
-  const auto points = align::align(cell, readings, poses, summary);
-  const double aligned = cpu_seconds();
-  edges::EdgeOptions options;
-  options.height_mm = 40;
-  const edges::EdgeScan scan = edges::detect(points, options);
-  const double searched = cpu_seconds();
-  const double n = static_cast<double>(points.size()) * 1e-6;
-  rows.push_back({"readings placed of those sent", 100.0 * static_cast<double>(points.size()) / total, "%",
-                  NAN, 99.9, Better::Higher});
-  rows.push_back({"decode", n / (decoded - start), "M/s", NAN, NAN, Better::None});
-  rows.push_back({"align", n / (aligned - decoded), "M/s", NAN, NAN, Better::None});
-  rows.push_back({"decode + align + points, one core", n / (aligned - start), "M/s", NAN, 5, Better::Higher});
-  rows.push_back({"edge search", n / (searched - aligned), "M/s", NAN, NAN, Better::None});
-}
-
 /// A core's decoding of each dialect; the fastest sensor of all sends 70,000 readings a second.
 void dialect_rows(std::vector<Row>& rows) {
   using wire::LaserDialect;
@@ -255,13 +192,13 @@ void dialect_rows(std::vector<Row>& rows) {
     wire::LaserDecoder decoder(wire::streams::format_of(dialect));
     double sum = 0;
     std::uint64_t readings = 0;
-    const double start = cpu_seconds();
+    const double start = bench::cpu_seconds();
     wire::streams::feed_blocks(decoder, dialect, stream, stream.size() / kBlocks,
                                [&](const wire::LaserReading& r) {
                                  sum += static_cast<double>(r.distance_mm);
                                  ++readings;
                                });
-    const double spent = cpu_seconds() - start;
+    const double spent = bench::cpu_seconds() - start;
     if (readings != std::uint64_t{kBlocks} * kFrames || !std::isfinite(sum)) {
       rows.push_back({std::string("decode ") + wire::to_string(dialect), 0, "M/s", NAN, 5, Better::Higher});
       continue;
@@ -278,14 +215,17 @@ int main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--json") == 0) continue;
     const bool help = std::strcmp(argv[i], "--help") == 0 || std::strcmp(argv[i], "-h") == 0;
-    if (!help) std::fprintf(stderr, "bench_sensing: what is '%s'?\n", argv[i]);
     std::fprintf(help ? stdout : stderr,
                  "usage: bench_sensing [--json]\nFigures of decoding, alignment and edge detection.\n");
     return help ? 0 : 2;
   }
   std::vector<weldcell::bench::Row> rows;
-  weldcell::speed_rows(rows);
+  // The hour first: what came before would hide how its memory grows.
+  weldcell::bench::hour_rows(rows);
+  weldcell::bench::stream_rows(rows);
   weldcell::dialect_rows(rows);
+  weldcell::bench::damage_rows(rows);
+  weldcell::bench::latency_rows(rows);
   weldcell::clock_rows(rows);
   weldcell::edge_rows(rows);
   weldcell::hard_edge_rows(rows);

@@ -26,8 +26,14 @@ struct SurfacePoint {
 
 /// What the alignment did, for the report and for alarms.
 struct AlignSummary {
-  std::uint64_t points = 0, invalid = 0, lost = 0, without_pose = 0, clock_resets = 0;
+  std::uint64_t points = 0, invalid = 0, lost = 0, without_pose = 0;
+  std::uint64_t clock_resets =
+      0;  ///< times that a clock began anew or was stepped: a mapping of its own from there on
+  std::uint64_t clock_stalls =
+      0;                       ///< times that the laser's clock stood still: placed by the count meanwhile
+  std::uint64_t repeated = 0;  ///< readings and poses that came twice, or with an older clock, left out
   double laser_skew_ppm = 0, robot_skew_ppm = 0;
+  double laser_rate_hz = 0;  ///< by running number and arrival over the whole scan; 0 = not known
   double laser_clock_sigma_us = 0,
          robot_clock_sigma_us = 0;  ///< stated 1-sigma of the mapping, constant excluded
 };

@@ -28,7 +28,9 @@ class LaserDevice {
   /// half an exposure more.
   std::vector<LaserBlock> advance(HostTime now, const PoseAt& pose_at);
   /// "laser_drop": the connection is gone for duration_s (0: for good); "laser_stall": blocks are held back
-  /// that long. False when the kind is unknown.
+  /// that long; "laser_clock_step", "laser_clock_back": its clock leaps by that much; "laser_clock_stop": it
+  /// stands still that long; "laser_clock_reset": clock and running number begin at 0. False when the kind is
+  /// unknown.
   bool inject(const std::string& fault, double duration_s);
   /// False while a drop lasts.
   bool connected() const;

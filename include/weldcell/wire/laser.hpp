@@ -2,10 +2,11 @@
 // allocation-free.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+
+#include "weldcell/wire/laser_window.hpp"
 
 namespace weldcell::wire {
 
@@ -38,37 +39,19 @@ struct Meas28Layout {
   std::size_t frame_bytes() const;
 };
 
-struct LaserCounters {
-  std::uint64_t blocks = 0;  ///< headers accepted
-  std::uint64_t readings = 0;
-  std::uint64_t lost_readings = 0;  ///< numbers that the running count jumped over
-  std::uint64_t resyncs = 0;        ///< times that the stream was not what the last header promised
-  std::uint64_t skipped_bytes = 0;  ///< bytes searched through for the next header
-  std::uint64_t restarts = 0;  ///< times that the sensor's count went backwards or leapt by more than 2^20
-};
-
 /// Stream decoder. feed() takes any split of the byte stream and calls sink(const LaserReading&) per reading.
 ///
-/// A block whose running count contradicts itself or its header is dropped from there on. A layout with the
-/// counter loses only damaged blocks; without it, missing bytes can take the following block along.
-class Meas28Decoder {
+/// A frame whose running count is wrong is passed over where a frame behind it, or the next header, is where
+/// it belongs; else the block is dropped from there on. Without the counter, missing bytes can take the
+/// following block along.
+class Meas28Decoder : public LaserWindow<Meas28Decoder, 4096> {
  public:
   explicit Meas28Decoder(Meas28Layout layout) : layout_(layout), frame_bytes_(layout.frame_bytes()) {}
-
-  template <typename Sink>
-  void feed(std::span<const std::byte> bytes, Sink&& sink) {
-    while (!bytes.empty()) {
-      bytes = take(bytes);
-      LaserReading reading;
-      while (next(reading)) sink(static_cast<const LaserReading&>(reading));
-    }
-  }
-  const LaserCounters& counters() const { return counters_; }
   /// Forgets stream and numbering, for a new connection; the counters go on.
   void reset();
 
  private:
-  enum class Step : std::uint8_t { NeedMore, Again, Reading };
+  friend LaserWindow;
   struct Header {
     std::uint16_t frames = 0;
     std::uint32_t counter = 0;
@@ -76,29 +59,21 @@ class Meas28Decoder {
   /// Which of the two u16 of a header counts the frames; manuals disagree, so the stream decides.
   enum class SizeOrder : std::uint8_t { Unknown, FramesFirst, BytesFirst };
 
-  /// Copies what fits into the buffer and returns the rest.
-  std::span<const std::byte> take(std::span<const std::byte> bytes) noexcept;
-  bool next(LaserReading& out) noexcept;
-  Step search() noexcept;
+  static constexpr std::size_t header_bytes() { return 28; }
+  bool header_here() noexcept;
   Step take_header() noexcept;
   Step take_frame(LaserReading& out) noexcept;
-  /// Needs 28 bytes at the place. True when they are a header of this layout.
-  bool read_header(std::size_t at, Header& out) noexcept;
+  bool followers_agree(std::uint32_t& number) const noexcept;
+  Step pass_damaged_frame(std::uint32_t expected) noexcept;
+  /// Needs 28 bytes. True when the window begins with a header of this layout.
+  bool read_header(Header& out) noexcept;
   bool accept_number(std::uint32_t word, std::uint32_t& number) noexcept;
   std::uint32_t unwrap(std::uint32_t number, std::uint32_t mask) noexcept;
-  void lose_sync() noexcept;
-  void consume(std::size_t bytes) noexcept;
 
   Meas28Layout layout_;
   std::size_t frame_bytes_;
-  LaserCounters counters_;
-  std::array<std::byte, 4096> buffer_{};
-  std::size_t begin_ = 0, end_ = 0;
-  std::size_t last_item_ = 0;  ///< where the header or frame before begin_ starts: the way back
-  bool searching_ = false;
   SizeOrder size_order_ = SizeOrder::Unknown;
   Header block_;
-  std::uint16_t frames_left_ = 0;
   std::uint32_t next_counter_ = 0;
   bool numbering_ = false;    ///< next_counter_ is known
   std::uint32_t offset_ = 0;  ///< frame count minus header count, modulo 2^24

@@ -1,7 +1,6 @@
 // Laser bytes -> readings for every dialect beside MEAS-28, and one decoder over all. Pure, allocation-free.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -45,56 +44,38 @@ const char* laser_format_fault(const LaserFormat& format);
 /// Nothing inside a frame tells damage, so a damaged frame reads as another value. A block whose header does
 /// not go on from the one before is dropped unless bytes were missing before it; the next block decides
 /// whether the count was damaged or has jumped.
-class LaserBlockDecoder {
+class LaserBlockDecoder : public LaserWindow<LaserBlockDecoder, 2048> {
  public:
   /// Needs a format without a fault.
   explicit LaserBlockDecoder(const LaserFormat& format);
-
-  template <typename Sink>
-  void feed(std::span<const std::byte> bytes, Sink&& sink) {
-    while (!bytes.empty()) {
-      bytes = take(bytes);
-      LaserReading reading;
-      while (next(reading)) sink(static_cast<const LaserReading&>(reading));
-    }
-  }
-  const LaserCounters& counters() const { return counters_; }
   void reset();
 
  private:
-  enum class Step : std::uint8_t { NeedMore, Again, Reading };
+  friend LaserWindow;
   struct Header {
     std::uint32_t frames = 0;
     std::uint32_t counter = 0;
   };
 
-  std::span<const std::byte> take(std::span<const std::byte> bytes) noexcept;
-  bool next(LaserReading& out) noexcept;
-  Step search() noexcept;
+  std::size_t header_bytes() const noexcept { return header_bytes_; }
+  bool header_here() const noexcept;
   Step take_header() noexcept;
-  Step look_for_header() noexcept;
   Step take_frame(LaserReading& out) noexcept;
+  Step look_for_header() noexcept;
   bool may_be_header(const std::byte* p) const noexcept;
   bool read_header(const std::byte* p, Header& out) const noexcept;
   bool accept_count() noexcept;
   void read_frame(const std::byte* p, LaserReading& out) const noexcept;
-  void lose_sync() noexcept;
 
   LaserFormat format_;
   std::size_t header_bytes_, frame_bytes_;
-  LaserCounters counters_;
-  std::array<std::byte, 2048> buffer_{};
-  std::size_t begin_ = 0, end_ = 0;
-  std::size_t last_item_ = 0;  ///< where the header or frame before begin_ starts: the way back
-  bool searching_ = false, after_search_ = false, dropping_ = false;
+  bool dropping_ = false;
   Header block_;
-  std::uint32_t frames_left_ = 0;
   std::uint32_t next_counter_ = 0;
   bool numbering_ = false;
   bool settled_ = false;          ///< some header went on from the one before
   std::uint32_t rival_next_ = 0;  ///< next count if the dropped header was right
   bool rival_known_ = false;
-  std::uint64_t moved_ = 0;  ///< stream bytes before the buffer
   std::uint64_t trusted_place_ = 0;
   std::uint32_t trusted_counter_ = 0;  ///< of the last header that went on from the one before
   bool doubted_ = false;               ///< the last header accepted did not go on from one before

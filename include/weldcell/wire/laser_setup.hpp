@@ -64,8 +64,8 @@ class LaserSetup {
 
   void then(Step step) { steps_.push_back(std::move(step)); }
   void first(Step step) { steps_.push_front(std::move(step)); }
-  void name_device(const std::string& name) { device_ = wanted_.device + " (" + name + ")"; }
-  void note(std::string text) { notes_.push_back(std::move(text)); }
+  void name_device(const std::string& name);
+  void note(const std::string& text);
   /// A setting that differs: key of the cell file, its value, the sensor's, what to do.
   void differs(const std::string& setting, const std::string& configured, const std::string& found,
                const std::string& mend);

@@ -260,5 +260,138 @@ TEST(Align, EmptyAndDegenerateRecordsAreNoPoints) {
   EXPECT_TRUE(align(cell, one, pose, summary).empty());
 }
 
+/// Every reading by its name, carried in the error word: an invalid reading keeps its place on the table.
+double worst_named_place_mm(const cell::CellSetup& cell, const Motion& motion, const Recording& recording,
+                            const std::vector<SurfacePoint>& points) {
+  double worst = 0;
+  for (const SurfacePoint& p : points) {
+    const auto beam = beam_at(cell, motion.at(recording.true_time_s[p.code - 1]));
+    const double length = (cell.table.z_mm - beam.position_mm().z()) / beam.rotation()(2, 2);
+    const Eigen::Vector3d truth = (beam * Point<Laser>{{0, 0, length}}).mm;
+    worst = std::max(
+        worst, std::hypot(static_cast<double>(p.x_mm) - truth.x(), static_cast<double>(p.y_mm) - truth.y()));
+  }
+  return worst;
+}
+
+enum class Trouble {
+  LaserSteps,
+  LaserGoesBack,
+  LaserStands,       // and goes on from where it stood
+  LaserStandsLeaps,  // and goes on as if it had not stood
+  LaserCountStands,  // and leaps at its end
+  LaserRestarts,
+  LaserWraps,
+  ReadingsTwice,
+  RobotSteps,
+  RobotGoesBack,
+  RobotStands,
+  RobotRestarts,
+};
+
+/// The trouble begins at `at_s` and has the size `size_s`.
+void trouble(Recording& recording, Trouble kind, double at_s, double size_s) {
+  const auto us = static_cast<std::uint32_t>(std::llround(size_s * 1e6));
+  std::uint32_t stamp_there = 0, count_there = 0;
+  std::int64_t time_there = 0;
+  for (std::size_t k = 0; k < recording.readings.size(); ++k) {
+    auto& r = recording.readings[k].reading;
+    const double since_s = recording.true_time_s[k] - at_s;
+    if (since_s < 0) {
+      stamp_there = r.timestamp_us;
+      count_there = r.counter;
+      continue;
+    }
+    const bool during = since_s < size_s;
+    switch (kind) {
+      case Trouble::LaserSteps:
+        r.timestamp_us += us;
+        break;
+      case Trouble::LaserGoesBack:
+        r.timestamp_us -= us;
+        break;
+      case Trouble::LaserStands:
+        r.timestamp_us = during ? stamp_there : r.timestamp_us - us;
+        break;
+      case Trouble::LaserStandsLeaps:
+        if (during) r.timestamp_us = stamp_there;
+        break;
+      case Trouble::LaserCountStands:
+        if (during) r.counter = count_there;
+        break;
+      case Trouble::LaserRestarts:
+        r.timestamp_us -= stamp_there;
+        r.counter -= count_there;
+        break;
+      default:
+        break;
+    }
+  }
+  for (auto& p : recording.poses) {
+    const double since_s = seconds(p.arrival - HostTime{0}) - at_s;
+    if (since_s < 0) {
+      time_there = p.feedback.time_us;
+      continue;
+    }
+    if (kind == Trouble::RobotSteps) p.feedback.time_us += us;
+    if (kind == Trouble::RobotGoesBack) p.feedback.time_us -= us;
+    if (kind == Trouble::RobotStands)
+      p.feedback.time_us = since_s < size_s ? time_there : p.feedback.time_us - us;
+    if (kind == Trouble::RobotRestarts) p.feedback.time_us -= time_there;
+    p.feedback.tm_ms = static_cast<std::uint32_t>(p.feedback.time_us / 1000);
+  }
+  if (kind == Trouble::ReadingsTwice) {
+    const auto from = recording.readings.begin() + static_cast<std::ptrdiff_t>(at_s * 5000);
+    const std::vector<StampedReading> again(from, from + 1);
+    recording.readings.insert(from + 1, static_cast<std::size_t>(size_s * 5000), again.front());
+  }
+}
+
+TEST(Align, EveryTroubleOfAClockIsRecognizedAndMovesNoPoint) {
+  const cell::CellSetup cell = test_cell();
+  std::mt19937_64 random(kSeed + 9);
+  std::uniform_real_distribution<double> uniform;
+  for (int kind_number = 0; kind_number <= static_cast<int>(Trouble::RobotRestarts); ++kind_number) {
+    const auto kind = static_cast<Trouble>(kind_number);
+    double worst = 0;
+    std::size_t fewest = 100'000;
+    for (int trial = 0; trial < 8; ++trial) {
+      SCOPED_TRACE(testing::Message() << "trouble " << kind_number << " trial " << trial);
+      const Motion motion{3 + 2 * uniform(random), 0.15 + 0.1 * uniform(random)};
+      Truth truth;
+      truth.duration_s = 5;
+      truth.stall_every_s = 1.7;
+      truth.stall_s = 0.05;
+      const double at_s = 1.5 + 2 * uniform(random), size_s = 0.02 * std::pow(50, uniform(random));
+      if (kind == Trouble::LaserWraps) truth.laser_zero_s = 4294.967296 - at_s;
+      Recording recording = record(cell, motion, truth, random);
+      for (std::size_t k = 0; k < recording.readings.size(); ++k)
+        recording.readings[k].reading.code = static_cast<std::uint32_t>(k + 1);
+      trouble(recording, kind, at_s, size_s);
+      AlignSummary summary;
+      const auto points = align(cell, recording.readings, recording.poses, summary);
+      worst = std::max(worst, worst_named_place_mm(cell, motion, recording, points));
+      fewest = std::min(fewest, points.size());
+      const bool stands = kind == Trouble::LaserStands || kind == Trouble::LaserStandsLeaps;
+      EXPECT_EQ(summary.clock_stalls, stands ? 1U : 0U);
+      const bool goes_on =
+          kind == Trouble::LaserStands || kind == Trouble::LaserWraps || kind == Trouble::ReadingsTwice;
+      if (goes_on) {
+        EXPECT_EQ(summary.clock_resets, 0U);
+      } else {
+        EXPECT_GE(summary.clock_resets, 1U);
+        EXPECT_LE(summary.clock_resets, 2U);
+      }
+      const bool left_out = kind == Trouble::ReadingsTwice || kind == Trouble::RobotStands;
+      EXPECT_EQ(summary.repeated > 0, left_out || (kind == Trouble::RobotGoesBack && size_s < 0.1))
+          << summary.repeated;
+    }
+    std::printf("trouble %2d: worst place %.4f mm, at least %zu of 25000 readings placed\n", kind_number,
+                worst, fewest);
+    EXPECT_LE(worst, 0.1) << kind_number;
+    EXPECT_GT(fewest, 19'000U) << kind_number;  // a robot's clock that stands a second costs that second
+  }
+}
+
 }  // namespace
 }  // namespace weldcell::align

@@ -36,6 +36,8 @@ inline void put_block(Stream& s, LaserDialect dialect, std::uint32_t from, std::
   const bool od = dialect == LaserDialect::Od5000;
   if (dialect == LaserDialect::Data28) {
     for (const std::uint32_t v : {0x41544144U, 1U, 2U, 0U, 12U, frames, from}) put(s, v, 4);
+  } else if (dialect == LaserDialect::Meas28) {
+    for (const std::uint32_t v : {0x4D454153U, 1U, 2U, 0x18U, 0U, frames | 12U << 16, from}) put(s, v, 4);
   } else if (dialect == LaserDialect::Meas32) {
     for (const std::uint32_t v : {0x4D454153U, 1U, 2U, 5U, 0U, 0U, frames | 8U << 16, from}) put(s, v, 4);
   } else if (od) {
@@ -50,6 +52,10 @@ inline void put_block(Stream& s, LaserDialect dialect, std::uint32_t from, std::
       put(s, 0x200, 4);
       put(s, bad ? 0x7FFFFF05 : 20'000'000 + n % 1000 * 1000, 4);
       put(s, n * 100, 4);
+    } else if (dialect == LaserDialect::Meas28) {
+      put(s, n & 0xFFFFFF, 4);
+      put(s, n * 100, 4);
+      put(s, bad ? 0x7FFFFFFA : 20'000'000 + n % 1000 * 1000, 4);
     } else if (dialect == LaserDialect::Meas32) {
       put(s, 0x1111, 4);
       put(s, bad ? 100 : 4000 + n % 9000, 4);
