@@ -209,8 +209,10 @@ bool too_vague(const Situation& s, Localization& result) {
   const Eigen::Matrix2d xy = result.covariance.topLeftCorner<2, 2>();
   const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(xy).eigenvalues()(1);
   const double sigma_rad = std::sqrt(result.covariance(2, 2));
+  // Of two readings that lie apart the unlikelier one is not passed over.
+  const double most_sigma = s.fit.either ? 0.5 * kPoseBound_mm : kMostSigma_mm;
   // A covariance that rounding has left without a positive determinant proves nothing either.
-  const bool proven = result.covariance.allFinite() && largest <= kMostSigma_mm * kMostSigma_mm &&
+  const bool proven = result.covariance.allFinite() && largest <= most_sigma * most_sigma &&
                       Eigen::LLT<Eigen::Matrix3d>(result.covariance).info() == Eigen::Success;
   const double bound_rad = std::max(kPoseBound_rad, 1.0 / std::max(s.outline.radius_mm, 1.0));
   if (proven && chance_beyond(s.fit.chances, kPoseBound_mm, bound_rad) <= kMostFartherOff) return false;

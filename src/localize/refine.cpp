@@ -16,6 +16,8 @@ constexpr double kWideInset_mm = 3;
 /// Odds that a stated prior holds, before the points speak.
 constexpr double kPriorHolds_nats = 3;
 constexpr double kFreeMember_nats = 2;
+/// Odds of the wide prior of the latency over the stated one, before the points speak.
+constexpr double kWideLatency_nats = 2;
 /// Odds of about 1000 : 1 tell which of two members is off.
 constexpr double kTellsMembers_nats = 7;
 /// So many crossings, evenly taken, tell which members are off and how far sigmas can be believed.
@@ -210,7 +212,7 @@ class Refinement {
     place();
     NormalEquations equations(fields_.member_centroids(), priors_);
     weigh_mixture(equations);
-    take(mean_of(equations.over_scales(free_, latencies_ms())));
+    take(mean_of(answers(equations, free_)));
     if (step == 1 || step == 2) rescale();
   }
 
@@ -219,6 +221,19 @@ class Refinement {
   std::vector<double> latencies_ms() const {
     if (priors_.latency_ms <= 0) return {0};
     return {priors_.latency_ms, kWideLatency_ms};
+  }
+
+  /// Over scales and latencies. Where a scan tells a latency from a turn by little the stated prior, which
+  /// bends the pose when it is wrong, must be the likelier one by more than the charge alone.
+  std::vector<Weighed> answers(const NormalEquations& equations,
+                               const std::vector<bool>& free_members) const {
+    const std::vector<double> latencies = latencies_ms();
+    std::vector<Weighed> out = equations.over_scales(free_members, latencies);
+    for (std::size_t i = 1; latencies.size() == 2 && i < out.size(); i += 2) {
+      out[i].log_weight += kWideLatency_nats;
+      out[i].log_bet += kWideLatency_nats;
+    }
+    return out;
   }
 
   /// A rail pulled off its rungs looks the same as the rest of the part pulled off that rail. Where another
@@ -243,8 +258,7 @@ class Refinement {
     if (other == held) return;
     std::vector<bool> swapped(free_.size(), false);
     swapped[other] = true;
-    std::vector<Weighed> both = equations.over_scales(free_, latencies_ms()),
-                         second = equations.over_scales(swapped, latencies_ms());
+    std::vector<Weighed> both = answers(equations, free_), second = answers(equations, swapped);
     const Solution stated = mean_of(both);
     Either either{{static_cast<int>(held), after(stated)},
                   {static_cast<int>(other), after(mean_of(second))},
@@ -302,6 +316,8 @@ class Refinement {
         good = std::exp(-0.5 * squared_miss(fit_.residuals[i], fit_.matches[i]) / (sigma * sigma));
         fit_.inlier[i] = good / (good + clutter);
         if (fit_.inlier[i] > 0.5) ++fit_.member_points[static_cast<std::size_t>(member_of(i))];
+        // A wider sigma explains more, and each point less well.
+        good /= fit_.scale;
       }
       fit_.log_likelihood += std::log(good + clutter);
     }

@@ -18,6 +18,8 @@ namespace {
 constexpr std::size_t kModes = 8;
 /// Beyond this a second mode need not be looked at more closely.
 constexpr double kFarBehind_nats = 40;
+/// A millisecond that looks like so much turn at the farthest point is told apart from it by little.
+constexpr double kCoupled_mm_per_ms = 0.05;
 /// At least two points, so that no stray one alone tells which of two members is off.
 constexpr double kTellsMembers_nats = 12;
 
@@ -64,6 +66,7 @@ class Solver {
     if (candidates_.empty()) return false;
     fit_ = refine(fields_, crossings_,
                   polish(fields_, medium_, candidates_.front().state.pose, 4, &iterations_), priors_);
+    try_other_latencies();
     evidence_ = gather_evidence(fields_, path_, fit_);
     weigh_rivals();
     tell_member_off();
@@ -136,6 +139,30 @@ class Solver {
         outline_.symmetries.begin(), outline_.symmetries.end(), [&](const workpiece::Symmetry& s) {
           return s.gap_mm == 0 && same_place(fields_, pose, centred_pose(outline_, found * s.map));
         });
+  }
+
+  /// Where the scan went one way only, a turn and a latency look alike, and the fit may have settled on a far
+  /// pair of them: others along that direction are tried as starts.
+  void try_other_latencies() {
+    const double variance = fit_.covariance(3, 3);
+    const double coupled = fit_.covariance(2, 3) / std::max(variance, 1e-12);
+    if (!(std::abs(coupled) * fields_.radius_mm() > kCoupled_mm_per_ms)) return;
+    const Fit first = fit_;
+    for (const double latency_ms : {-10.0, 0.0, 10.0}) {
+      const double by = latency_ms - first.state.latency_ms;
+      if (std::abs(by) < 3) continue;
+      FitState start;
+      start.pose = first.state.pose;
+      const Eigen::Vector3d step = by / variance * first.covariance.block<3, 1>(0, 3);
+      const double c = std::cos(start.pose.theta_rad), s = std::sin(start.pose.theta_rad);
+      start.pose.centre += Vec2(c * step(0) - s * step(1), s * step(0) + c * step(1));
+      start.pose.theta_rad = wrap_pi(start.pose.theta_rad + step(2));
+      start.latency_ms = latency_ms;
+      Fit other = refine(fields_, crossings_, start, priors_);
+      if (other.log_likelihood > fit_.log_likelihood &&
+          same_place(fields_, other.state.pose, first.state.pose))
+        fit_ = std::move(other);
+    }
   }
 
   void weigh_rivals() {
