@@ -159,7 +159,8 @@ void Cell::on(const EgmCycle& cycle) {
   if (!running) {
     fault(FaultCode::RobotStopped,
           "the controller left EGM while scanning (motors off, emergency stop or program stop)");
-  } else if (report.plan_id == plan->id && report.plan_done) {
+  } else if (motion_started_ && report.plan_id == plan->id && report.plan_done) {
+    // Before this plan was begun, the report still says that the last one came to its end.
     motion_finished_ = true;
     motion_done_at_ = now_;
     status_.progress = 1;

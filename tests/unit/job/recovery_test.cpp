@@ -4,6 +4,20 @@
 namespace weldcell::job {
 namespace {
 
+TEST(CellRecovery, AScanIsNotOverBecauseTheLastOneWas) {
+  Driver d;
+  d.ready(false).order(wire::PlcCommand::Arm).order(wire::PlcCommand::Start).robot_done();
+  for (int i = 0; i < 5; ++i) d.feed(frame(Mci::MCI_RUNNING));
+  ASSERT_EQ(d.state(), State::Scanning);
+  // Cycles from before the session took the new plan speak of the old one.
+  EgmCycle stale = frame(Mci::MCI_RUNNING, true);
+  stale.report.phase = robot::EgmPhase::Holding;
+  for (int i = 0; i < 4; ++i) d.feed(stale).feed(LaserBytes{}).feed(Tick{}, 0.1);
+  EXPECT_EQ(d.state(), State::Scanning);
+  d.feed(frame(Mci::MCI_RUNNING)).feed(stale).feed(LaserBytes{}).feed(Tick{}, 0.2);
+  EXPECT_EQ(d.state(), State::Localizing);
+}
+
 TEST(CellRecovery, SeamsAskedForAtAResumeAreKnownThoughPlanningIsFaster) {
   Driver d;
   d.feed(LinkChange{Link::Laser, true, ""}).feed(LinkChange{Link::Rws, true, ""});
