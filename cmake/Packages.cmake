@@ -12,6 +12,7 @@ find_package(Poco REQUIRED COMPONENTS Foundation Net NetSSL Crypto Util)
 find_package(Protobuf REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(MODBUS REQUIRED IMPORTED_TARGET libmodbus)
+pkg_check_modules(SODIUM REQUIRED IMPORTED_TARGET libsodium)
 pkg_check_modules(SYSTEMD REQUIRED IMPORTED_TARGET libsystemd)
 pkg_check_modules(CAIRO REQUIRED IMPORTED_TARGET cairo pangocairo)
 pkg_check_modules(SDL2 REQUIRED IMPORTED_TARGET sdl2)
@@ -19,7 +20,7 @@ pkg_check_modules(SDL2 REQUIRED IMPORTED_TARGET sdl2)
 # What adapters and simulator may touch the world with; the core never links it.
 add_library(weldcell_devices INTERFACE)
 target_link_libraries(weldcell_devices INTERFACE
-  Poco::NetSSL Poco::Crypto Poco::Net Poco::Foundation OpenSSL::SSL OpenSSL::Crypto pugixml::pugixml PkgConfig::MODBUS PkgConfig::SYSTEMD
+  Poco::NetSSL Poco::Crypto Poco::Net Poco::Foundation OpenSSL::SSL OpenSSL::Crypto pugixml::pugixml PkgConfig::MODBUS PkgConfig::SODIUM PkgConfig::SYSTEMD
   PkgConfig::CAIRO PkgConfig::SDL2 Threads::Threads)
 
 # The EGM messages, generated as protobuf-lite into the build tree.

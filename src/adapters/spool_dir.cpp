@@ -242,10 +242,13 @@ Status SpoolDir::reject(const SpoolEntry& entry, const std::string& reason) {
   const fs::path name(entry.name);
   const std::string extension = entry.folder ? "" : name.extension().string();
   const std::string stem = entry.folder ? entry.name : name.stem().string();
-  const std::string fresh = free_name(rejected, stem, {extension, extension + ".reason"}) + extension;
+  const std::string fresh =
+      free_name(rejected, stem, {extension, extension + ".reason", extension + ".minisig"}) + extension;
   int failed = write_text_durably(rejected / (fresh + ".reason"), entry.name + ": " + reason + "\n");
   if (failed == 0) failed = rename_fresh(source, rejected / fresh);
   if (failed != 0) return io_fault(source, failed);
+  // Left behind it would be held against the next job of that name.
+  if (!entry.folder) rename_fresh(source.string() + ".minisig", rejected / (fresh + ".minisig"));
   sync_folder(rejected);
   sync_folder(s.place(SpoolPlace::Incoming));
   s.watch.forget(entry.name);
@@ -278,7 +281,8 @@ std::vector<SpoolJob> SpoolDir::list() const {
     std::error_code error;
     for (fs::directory_iterator it(s.place(place), error), end; !error && it != end; it.increment(error)) {
       const std::string name = it->path().filename().string();
-      if (!is_passing_name(name) && !(place == SpoolPlace::Rejected && name.ends_with(".reason")))
+      if (!is_passing_name(name) &&
+          !(place == SpoolPlace::Rejected && (name.ends_with(".reason") || has_signature_name(name))))
         paths.push_back(it->path());
     }
     std::ranges::sort(paths);

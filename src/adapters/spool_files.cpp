@@ -196,6 +196,8 @@ bool has_cad_name(const fs::path& path) {
   return extension == ".step" || extension == ".stp" || extension == ".dxf";
 }
 
+bool has_signature_name(const fs::path& path) { return path.extension() == ".minisig"; }
+
 bool is_passing_name(const std::string& name) {
   return name.empty() || name.front() == '.' || name.ends_with('~') || name.ends_with(".tmp") ||
          name.ends_with(".part") || name.ends_with(".swp") || name.ends_with(".filepart");

@@ -50,6 +50,8 @@ std::vector<std::filesystem::path> job_files_in(const std::filesystem::path& fol
                                                 std::size_t max_job_bytes);
 bool has_yaml_name(const std::filesystem::path& path);
 bool has_cad_name(const std::filesystem::path& path);
+/// NAME.yaml.minisig
+bool has_signature_name(const std::filesystem::path& path);
 /// Names that are never looked at: hidden, or of a copy under way.
 bool is_passing_name(const std::string& name);
 

@@ -1,6 +1,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <map>
@@ -41,8 +42,12 @@ std::optional<Error> fill(const fs::path& staging, const std::map<std::string, f
 Result<fs::path> submit_job(const fs::path& root, const fs::path& job_file, std::span<const fs::path> files) {
   std::map<std::string, fs::path> sources;
   std::error_code error;
-  for (std::size_t i = 0; i <= files.size(); ++i) {
-    const fs::path& path = i == 0 ? job_file : files[i - 1];
+  std::vector<fs::path> all{job_file};
+  all.insert(all.end(), files.begin(), files.end());
+  const fs::path signature = job_file.string() + ".minisig";
+  if (fs::exists(signature, error) && std::ranges::find(files, signature) == files.end())
+    all.push_back(signature);
+  for (const fs::path& path : all) {
     const fs::path real = fs::canonical(path, error);
     if (error) return file_fault(path, error.message());
     if (!fs::is_regular_file(real, error)) return file_fault(path, "is no plain file");

@@ -197,7 +197,7 @@ SpoolWatch::Look SpoolWatch::look_at(const std::string& name, Seen& seen, HostTi
 
 SpoolWatch::Look SpoolWatch::look_at_file(const fs::path& path, const Seen& seen, HostTime at) const {
   Look out;
-  if (has_cad_name(path)) {
+  if (has_cad_name(path) || has_signature_name(path)) {
     out.kind = Look::Kind::Companion;
     return out;
   }

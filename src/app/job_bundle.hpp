@@ -23,7 +23,7 @@ Result<workpiece::Workpiece> load_workpiece(const job::JobOrder& order, const st
 /// Both; the text of every fault when something is wrong.
 std::variant<JobBundle, std::string> load_job(const std::string& job_file, const std::string& cad_cache_dir);
 
-/// "sha256:<hex>" of a file's bytes.
-Result<std::string> file_revision(const std::string& path);
+/// "sha256:" and the 64 digits of the bytes.
+std::string revision_of(const std::string& text);
 
 }  // namespace weldcell::app

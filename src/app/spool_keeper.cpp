@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "app/job_signing.hpp"
 #include "app/places.hpp"
 #include "weldcell/adapters/host_clock.hpp"
-#include "weldcell/files/job_file.hpp"
 
 namespace weldcell::app {
 
@@ -15,7 +15,7 @@ namespace {
 
 using adapters::SpoolMark;
 
-/// How long a job waits for a workpiece file that it names.
+/// How long a job waits for a workpiece file that it names, and for its signature.
 constexpr Nanoseconds kFileWait = 15 * kSecond;
 /// How long an order to cancel waits for its job.
 constexpr Nanoseconds kCancelWait = 10 * kSecond;
@@ -60,17 +60,15 @@ void SpoolKeeper::find_interrupted() {
     auto job = std::make_shared<ActiveJob>();
     job->folder = found.folder.string();
     job->arrived.id = found.name;
-    const auto text = read_file(found.job_file.string());
-    auto order = text.ok() ? files::parse_job(*text, found.job_file.string())
-                           : std::variant<job::JobOrder, files::Faults>(files::Faults{});
-    if (!std::holds_alternative<job::JobOrder>(order)) {
-      spdlog::error("job '{}' in active/ cannot be read any more and stays there: look into {}", found.name,
-                    job->folder);
+    auto read = read_job(found.job_file.string(), wiring_.config);
+    if (!read.ok()) {
+      spdlog::error("job '{}' in active/ cannot be run any more and stays there: look into {}: {}",
+                    found.name, job->folder, read.error().text());
       continue;
     }
-    job->arrived.order = std::get<job::JobOrder>(order);
+    job->arrived.order = read->order;
     job->arrived.number = job->arrived.order.number;
-    job->job_yaml = *text;
+    job->job_yaml = read->text;
     const Left left = read_left(job->folder, job->arrived);
     if (left.ended) {
       // Only its move out of active/ was cut off.
@@ -127,12 +125,12 @@ void SpoolKeeper::offer(adapters::SpoolEntry entry) {
     reject(entry, entry.problem);
     return;
   }
-  auto read = files::read_job_file(entry.job_file.string());
-  if (const auto* faults = std::get_if<files::Faults>(&read)) {
-    reject(entry, files::text(*faults));
+  const auto read = read_job(entry.job_file.string(), wiring_.config);
+  if (!read.ok()) {
+    refuse(entry, read.error());
     return;
   }
-  const auto& order = std::get<job::JobOrder>(read);
+  const job::JobOrder& order = read->order;
   waiting_.push_back({std::move(entry), nullptr, order.name, order.number, order.priority});
 }
 
@@ -197,15 +195,16 @@ void SpoolKeeper::take(const Waiting& waiting) {
     return;
   }
   const adapters::SpoolEntry& entry = waiting.entry;
-  auto read = files::read_job_file(entry.job_file.string());
-  if (const auto* faults = std::get_if<files::Faults>(&read)) {
-    reject(entry, files::text(*faults));
+  const auto read = read_job(entry.job_file.string(), wiring_.config);
+  if (!read.ok()) {
+    refuse(entry, read.error());
     return;
   }
-  const auto& order = std::get<job::JobOrder>(read);
-  const std::vector<std::string> needed{order.workpiece_file};
+  const job::JobOrder& order = read->order;
+  std::vector<std::string> needed{order.workpiece_file};
+  if (read->signature_there) needed.push_back(signature_file_of(entry.job_file.filename().string()));
   auto job = std::make_shared<ActiveJob>();
-  if (const auto text = read_file(entry.job_file.string()); text.ok()) job->job_yaml = *text;
+  job->job_yaml = read->text;
   auto taken = spool_.take(entry, order.name, needed);
   if (!taken.ok()) {
     const Error& fault = taken.error();
@@ -225,7 +224,8 @@ void SpoolKeeper::take(const Waiting& waiting) {
   job->arrived.id = taken->name;
   job->arrived.order = order;
   job->arrived.number = order.number;
-  spdlog::info("job '{}' taken from the spool", order.name);
+  spdlog::info("job '{}' taken from the spool{}{}", order.name, read->signer.empty() ? "" : ", ",
+               read->signer);
   if (!hand_over(job)) waiting_.push_front({{}, job, order.name, order.number, order.priority});
 }
 
@@ -233,6 +233,16 @@ bool SpoolKeeper::hand_over(std::shared_ptr<const ActiveJob> job) {
   const job::JobArrived arrived = job->arrived;
   handed_over_ = wiring_.inbox.push({arrived, std::move(job), nullptr});
   return handed_over_;
+}
+
+void SpoolKeeper::refuse(const adapters::SpoolEntry& entry, const Error& fault) {
+  if (fault.code == "job.unsigned" && entry.waited < kFileWait) {
+    if (entry.waited == 0)
+      spdlog::warn("{} waits {:.0f} s for its signature: {}", entry.name, seconds(kFileWait), fault.text());
+    spool_.put_back(entry);
+  } else {
+    reject(entry, fault.text());
+  }
 }
 
 void SpoolKeeper::reject(const adapters::SpoolEntry& entry, const std::string& reason) {

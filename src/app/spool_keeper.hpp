@@ -38,6 +38,7 @@ class SpoolKeeper {
   bool held(const Waiting& waiting) const;
   void take(const Waiting& waiting);
   bool hand_over(std::shared_ptr<const ActiveJob> job);
+  void refuse(const adapters::SpoolEntry& entry, const Error& fault);
   void reject(const adapters::SpoolEntry& entry, const std::string& reason);
   void count_waiting();
   /// Says once what hinders the spool; "" when nothing does any more.

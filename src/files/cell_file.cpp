@@ -94,6 +94,7 @@ void read_top(Map& top, const std::string& robots_dir, CellConfig& out) {
   section(top, "weld", Need::Optional, read_weld, out.setup.weld);
   section(top, "modbus", Need::Optional, read_modbus, out);
   section(top, "plc", Need::Optional, read_plc, out);
+  section(top, "jobs", Need::Optional, read_jobs, out);
   top.text("spool", out.spool_dir);
   top.text("state", out.state_dir);
   top.text("cad_cache", out.cad_cache_dir);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -204,6 +205,48 @@ void read_modbus(Map& map, CellConfig& config) {
 void read_plc(Map& map, CellConfig& config) {
   map.boolean("required", config.plc_required);
   map.number("heartbeat_timeout_s", config.plc_heartbeat_timeout_s, {0.1, 60});
+  map.finish();
+}
+
+namespace {
+
+/// What is no key is not repeated: it could be a secret one.
+void read_job_key(Map& map, const Node& item, std::vector<wire::MinisignKey>& keys) {
+  const auto fault = [&](const char* what, const char* mend) {
+    map.fault_at(item.line, map.dotted("signed_by"), what, mend);
+  };
+  const auto key = item.kind == Node::Kind::Scalar ? wire::minisign_key(item.text) : std::nullopt;
+  if (wire::looks_like_minisign_secret(item.text)) {
+    fault("holds a secret key, and every record keeps a copy of this file",
+          "remove it, count that pair as known to others and make a new one; the public key is the second "
+          "line of "
+          "minisign.pub");
+  } else if (!key) {
+    fault("holds what is no public key of minisign",
+          "write the second line of minisign.pub: 56 characters that begin with RW");
+  } else if (std::ranges::find(keys, *key) != keys.end()) {
+    fault("holds a key twice", "remove one of the two");
+  } else {
+    keys.push_back(*key);
+  }
+}
+
+}  // namespace
+
+void read_jobs(Map& map, CellConfig& config) {
+  constexpr std::size_t kMostKeys = 32;
+  static constexpr Choice<bool> kUnsigned[] = {{"accept", false}, {"refuse", true}};
+  map.choice("unsigned", config.unsigned_refused, kUnsigned);
+  const Node* list = map.sequence("signed_by");
+  if (list != nullptr && list->items.size() > kMostKeys) {
+    map.fault("signed_by", fmt::format("has {} keys", list->items.size()),
+              fmt::format("at most {}", kMostKeys));
+  } else if (list != nullptr) {
+    for (const Node& item : list->items) read_job_key(map, item, config.job_keys);
+  }
+  if (config.unsigned_refused && (list == nullptr || list->items.empty()))
+    map.fault("unsigned", "refuses every job: no key is named that could sign one",
+              "signed_by: [<second line of minisign.pub>]");
   map.finish();
 }
 

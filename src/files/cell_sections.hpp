@@ -16,6 +16,7 @@ void read_table(Map& map, cell::TableSetup& table);
 void read_weld(Map& map, cell::WeldSetup& weld);
 void read_modbus(Map& map, CellConfig& config);
 void read_plc(Map& map, CellConfig& config);
+void read_jobs(Map& map, CellConfig& config);
 
 /// Faults where the calibrated latency's conditions differ from what the cell runs: it holds for nothing
 /// else.

@@ -59,7 +59,8 @@ class SpoolDir {
 
   /// Waits at most `timeout` for a change and returns the entries that became whole, oldest first; each is
   /// offered once. Hidden names and names that end in ~ .tmp .part .swp are left alone; so are CAD files
-  /// (.step .stp .dxf) and YAML that is a workpiece and no job: they wait for the job that names them.
+  /// (.step .stp .dxf), signatures (.minisig) and YAML that is a workpiece and no job: they wait for their
+  /// job.
   std::vector<SpoolEntry> poll(Nanoseconds timeout);
   /// Offers the entry again when incoming/ changes, at the latest after a second (its CAD file has not come
   /// yet).
@@ -72,8 +73,8 @@ class SpoolDir {
   /// file), "spool.size", "spool.io". None of them moves anything.
   Result<SpoolJob> take(const SpoolEntry& entry, const std::string& job_name,
                         std::span<const std::string> files);
-  /// Moves the entry to rejected/ with its reason in <name>.reason beside it. A name that is taken there gets
-  /// -2, -3, ...
+  /// Moves the entry, with its signature, to rejected/ with its reason in <name>.reason beside it. A name
+  /// that is taken there gets -2, -3, ...
   Status reject(const SpoolEntry& entry, const std::string& reason);
   /// Moves active/<name> to done/ or failed/. Errors: "spool.missing", "spool.io".
   Result<SpoolJob> finish(const std::string& name, SpoolPlace done_or_failed);
@@ -107,8 +108,8 @@ bool job_marked(const std::filesystem::path& root, SpoolMark mark, const std::st
 std::vector<std::string> marked_jobs(const std::filesystem::path& root, SpoolMark mark);
 
 /// Drops a job and its files (each by path, kept under its file name) into <root>/incoming as one folder,
-/// atomically; returns the folder. The daemon need not run. Errors: "submit.file" (missing, not a file),
-/// "submit.duplicate", "submit.spool".
+/// atomically; returns the folder. A signature beside the job file, JOB.yaml.minisig, goes along. The daemon
+/// need not run. Errors: "submit.file" (missing, not a file), "submit.duplicate", "submit.spool".
 Result<std::filesystem::path> submit_job(const std::filesystem::path& root,
                                          const std::filesystem::path& job_file,
                                          std::span<const std::filesystem::path> files);

@@ -11,6 +11,7 @@
 #include "weldcell/cell/cell_setup.hpp"
 #include "weldcell/files/fault.hpp"
 #include "weldcell/wire/laser_dialects.hpp"
+#include "weldcell/wire/minisign.hpp"
 #include "weldcell/wire/plc_map.hpp"
 
 namespace weldcell::files {
@@ -64,6 +65,9 @@ struct CellConfig {
   wire::WordOrder word_order = wire::WordOrder::Abcd;
   double plc_heartbeat_timeout_s = 3.0;
   bool plc_required = true;  ///< false: operated from the command line only
+
+  std::vector<wire::MinisignKey> job_keys;  ///< who may sign jobs; empty: no signature is checked
+  bool unsigned_refused = false;            ///< only with job_keys
 
   std::string spool_dir = "/var/spool/weldcell";
   std::string state_dir = "/var/lib/weldcell";  ///< control socket, job journal
