@@ -29,5 +29,6 @@ int command_release(Arguments arguments);
 int command_cancel(Arguments arguments);
 int command_plc_check(Arguments arguments);
 int command_doctor(Arguments arguments);
+int command_migrate(Arguments arguments);
 
 }  // namespace weldcell::app

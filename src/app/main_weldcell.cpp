@@ -42,6 +42,7 @@ constexpr Command kCommands[] = {
     {"operate", weldcell::app::command_operate,
      "arm | start | confirm | stop | hold | unhold | resume | clear | reset | abort"},
     {"plc-check", weldcell::app::command_plc_check, "does a Modbus server, or a PLC, keep to docs/PLC.md?"},
+    {"migrate", weldcell::app::command_migrate, "a cell file of an older version -> today's, comments kept"},
     {"doctor", weldcell::app::command_doctor, "is this machine fit: real time, network, ports, disks, clock"},
 };
 

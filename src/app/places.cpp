@@ -1,7 +1,9 @@
 #include "app/places.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
+
 #include <array>
 
 #include <cerrno>
@@ -67,6 +69,12 @@ Status write_file_durably(const std::string& path, const std::string& text) {
   };
   const int fd = ::open(draft.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640);
   if (fd < 0) return failed("cannot be opened");
+  // Who could read the file before can read it still: a cell file is root's, and the daemon another user.
+  struct stat before {};
+  if (::stat(path.c_str(), &before) == 0) {
+    [[maybe_unused]] const int owner = ::fchown(fd, before.st_uid, before.st_gid);
+    ::fchmod(fd, before.st_mode & 07777);
+  }
   std::size_t done = 0;
   while (done < text.size()) {
     const ssize_t n = ::write(fd, text.data() + done, text.size() - done);

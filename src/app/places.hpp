@@ -19,7 +19,8 @@ std::string shared_file(const std::string& relative);
 Result<std::string> read_file(const std::string& path);
 /// The text of a file below config/, looked for as above; the error names the file and the places.
 Result<std::string> read_shared_file(const std::string& relative);
-/// Writes beside the path, syncs and renames, so that the file is never half.
+/// Writes beside the path, syncs and renames, so that the file is never half; owner and mode of a file that
+/// stood there stay.
 Status write_file_durably(const std::string& path, const std::string& text);
 
 }  // namespace weldcell::app

@@ -11,6 +11,7 @@
 #include "app/places.hpp"
 #include "weldcell/app/initial_state.hpp"
 #include "weldcell/files/cell_file.hpp"
+#include "weldcell/files/cell_migration.hpp"
 #include "weldcell/files/job_file.hpp"
 #include "weldcell/files/workpiece_file.hpp"
 #include "weldcell/job/work_order.hpp"
@@ -86,7 +87,10 @@ Result<Context> context_of(const Record& record, const std::vector<Change>& chan
       to_cell.push_back(change);
     }
   }
-  auto cell_yaml = changed(record.header.cell_yaml, to_cell);
+  // The record keeps the file as it was then.
+  const auto migrated = files::migrate_cell(record.header.cell_yaml, "cell.yaml in the record");
+  if (!migrated.ok()) return migrated.error();
+  auto cell_yaml = changed(migrated->text, to_cell);
   if (!cell_yaml.ok()) return cell_yaml.error();
   auto job_yaml = changed(record.header.job_yaml, to_job);
   if (!job_yaml.ok()) return job_yaml.error();

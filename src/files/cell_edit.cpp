@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "files/text_lines.hpp"
 #include "weldcell/files/document.hpp"
 
 namespace weldcell::files {
@@ -16,21 +17,6 @@ std::vector<std::string> lines_of(const std::string& text) {
     from = end + 1;
   }
   return lines;
-}
-
-/// Where a line's comment begins, quotes regarded; npos without one.
-std::size_t comment_at(const std::string& line) {
-  char quote = 0;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    if (quote != 0) {
-      if (line[i] == quote) quote = 0;
-    } else if (line[i] == '"' || line[i] == '\'') {
-      quote = line[i];
-    } else if (line[i] == '#' && (i == 0 || line[i - 1] == ' ' || line[i - 1] == '\t')) {
-      return i;
-    }
-  }
-  return std::string::npos;
 }
 
 std::string replaced(const std::string& line, const std::string& key, const std::string& value) {

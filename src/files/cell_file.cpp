@@ -7,6 +7,7 @@
 #include "files/cell_sections.hpp"
 #include "weldcell/base/units.hpp"
 #include "weldcell/files/arm_file.hpp"
+#include "weldcell/files/cell_migration.hpp"
 
 namespace weldcell::files {
 
@@ -80,6 +81,26 @@ void section(Map& top, const char* key, Need need, Read read, Into&... into) {
   if (node->kind == Node::Kind::Map) read(map, into...);
 }
 
+/// Another version is no cell file of today: its other faults would be judged by the wrong rules.
+bool of_this_version(Map& top, const Node& document) {
+  static_cast<void>(top.has("version") && top.node("version") != nullptr);
+  if (!top.has("cell") && !top.has("version")) return true;
+  const char* const at = top.has("version") ? "version" : "cell";
+  const auto version = cell_version(document);
+  if (!version.ok()) return top.fault("version", version.error().what, version.error().mend);
+  if (*version == kCellVersion) return true;
+  const std::string reads = fmt::format(", this weldcell reads {}", kCellVersion);
+  const bool stated = top.has("version");
+  return top.fault_at(
+      top.line_of(at), "version",
+      (stated ? fmt::format("is {}", *version) : std::string("is missing, so the file is of version 0")) +
+          reads,
+      *version > kCellVersion
+          ? std::string("install the weldcell that wrote it, or take the backup that its migration kept")
+          : "weldcell migrate " + top.file() +
+                " shows what changes, with --write it changes it and keeps a backup");
+}
+
 void read_top(Map& top, const std::string& robots_dir, CellConfig& out) {
   top.text("cell", out.setup.name, Need::Required);
   section(
@@ -115,7 +136,7 @@ std::variant<CellConfig, Faults> parse_cell(std::string_view text, const std::st
   CellConfig out;
   out.path = name;
   out.text = text;
-  read_top(top, robots_dir, out);
+  if (of_this_version(top, std::get<Node>(document))) read_top(top, robots_dir, out);
   if (faults.empty() && stale == StaleLatency::Fault)
     check_latency_conditions(std::get<Node>(document), out, name, faults);
   if (!faults.empty()) return in_order(std::move(faults));

@@ -88,7 +88,7 @@ TEST(CellFile, NamesEveryFaultWithItsLine) {
   EXPECT_THAT(found, HasSubstr("laser.rate_hz: 120000 is out of range: 50 to 70000"));
   EXPECT_THAT(found, HasSubstr("laser.latency: unknown key: did you mean 'latency_ms'?"));
   EXPECT_THAT(found, HasSubstr("laser.latency_ms: '.nan' is not finite"));
-  EXPECT_THAT(found, HasSubstr("cell.yaml:32: laser.rate_hz"));
+  EXPECT_THAT(found, HasSubstr("cell.yaml:33: laser.rate_hz"));
 }
 
 TEST(CellFile, RefusesAPasswordInTheFile) {
