@@ -22,6 +22,16 @@ json alternatives_json(const localize::Localization& found) {
   return out;
 }
 
+json rescan_json(const localize::Localization& found) {
+  json out = json::array();
+  for (const localize::ScanLine& line : found.rescan) {
+    out.push_back({{"member", line.member},
+                   {"from_mm", {line.from.x(), line.from.y()}},
+                   {"to_mm", {line.to.x(), line.to.y()}}});
+  }
+  return out;
+}
+
 double sigma(double variance) { return std::sqrt(std::max(variance, 0.0)); }
 
 /// Covariance and sigmas; null where none was estimated: a zero would claim that the place is known exactly.
@@ -99,6 +109,7 @@ nlohmann::json localize_json(const workpiece::OutlineTemplate& outline, const Po
       {"inset_mm", found.inset_mm},
       {"alternatives", alternatives_json(found)},
       {"members", members_json(found)},
+      {"rescan", rescan_json(found)},
       {"welds", welds_json(certificates)},
       {"seconds", seconds}};
   add_uncertainty(found, out);

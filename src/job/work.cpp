@@ -36,6 +36,9 @@ localize::LocalizeOptions localize_options(const cell::CellSetup& cell, const Jo
   options.max_rotation_rad = acceptance.max_rotation_rad * 1.05;
   options.max_mean_error_mm = acceptance.max_mean_error_mm;
   options.latency_sigma_s = cell.laser.latency_sigma_ms * 1e-3;
+  // Passes over every end and joint are planned, so they may be asked for.
+  options.prove_shift_mm = 10;
+  options.prove_free_ends = true;
   return options;
 }
 
@@ -63,6 +66,28 @@ void add(Evidence& evidence, const edges::EdgeScan& scan) {
   sum.bad_height += scan.summary.bad_height;
   sum.bad_fit += scan.summary.bad_fit;
   sum.paper_slot_too_wide += scan.summary.paper_slot_too_wide;
+}
+
+/// The lines that settle what was not looked at, at the found pose; the receiver looks along the edges.
+std::vector<plan::BeamPath> lines_asked_for(const localize::Localization& found) {
+  std::vector<plan::BeamPath> out;
+  for (const localize::ScanLine& line : found.rescan) {
+    Vec2 from = found.pose * line.from, to = found.pose * line.to;
+    if (!out.empty() && (out.back().points.back() - to).norm() < (out.back().points.back() - from).norm())
+      std::swap(from, to);
+    const Vec2 d = to - from;
+    out.push_back({line.member + " again", {from, to}, std::atan2(d.x(), -d.y())});
+  }
+  return out;
+}
+
+/// Whether every seam is inside its tolerance but for what was not looked at.
+bool seams_stand(const cell::CellSetup& cell, const Solution& before) {
+  const double most_gap_mm = certify_options(cell).max_gap_mm;
+  return std::all_of(before.certificates.begin(), before.certificates.end(),
+                     [&](const weld::WeldCertificate& c) {
+                       return c.bound_mm <= c.tolerance_mm && std::abs(c.gap_mm) <= most_gap_mm;
+                     });
 }
 
 std::vector<Segment> outline_at(const workpiece::OutlineTemplate& outline, const Pose2& pose) {
@@ -122,16 +147,23 @@ Result<Prepared> prepare(const cell::CellSetup& cell, const JobInput& job) {
 }
 
 Result<NextPass> plan_next_pass(const cell::CellSetup& cell, const JobInput& job, const Prepared& prepared,
-                                const localize::Localization& found) {
+                                const Solution& before, int pass) {
+  const localize::Localization& found = before.found;
+  const bool adaptive = job.order.inspection.pattern == plan::Pattern::Adaptive;
   plan::Inspection zigzag = job.order.inspection;
   zigzag.pattern = plan::Pattern::Zigzag;
-  if (job.order.inspection.pattern == plan::Pattern::Adaptive) {
-    // Two crossings in each direction tell shift, angle and latency of every member apart.
-    zigzag.passes_per_member = 4;
+  if (adaptive) {
+    // A crossing in each direction near either end, and a pass over each end, tell shift, angle and length of
+    // every member; the spiral has told the latency.
+    zigzag.passes_per_member = 2;
     zigzag.speed_mm_s = std::min(zigzag.speed_mm_s, 200.0);
   }
   NextPass out;
-  out.paths = plan::beam_paths(job.workpiece, found.pose, zigzag, plan::Pattern::Zigzag);
+  const std::vector<plan::BeamPath> lines = lines_asked_for(found);
+  if (lines.empty() || (adaptive && pass == 2) || !seams_stand(cell, before))
+    out.paths = plan::beam_paths(job.workpiece, found.pose, zigzag, plan::Pattern::Zigzag);
+  // A zigzag at the found pose crosses every end by itself.
+  if (out.paths.empty()) out.paths = lines;
   auto scan = plan::plan_scan(cell, out.paths, top_z_mm(cell, job.workpiece), zigzag.speed_mm_s,
                               prepared.scan->samples.back().q);
   if (!scan.ok()) return scan.error();

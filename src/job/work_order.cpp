@@ -11,6 +11,7 @@ std::optional<WorkOrder> work_order(const Output& output, const Cell& cell,
     order.kind = WorkKind::Plan;
   } else if (std::holds_alternative<PassRequest>(output)) {
     order.kind = WorkKind::Pass;
+    order.pass = cell.status().pass + 1;
   } else if (const auto* solve = std::get_if<SolveRequest>(&output)) {
     order.kind = WorkKind::Solve;
     order.scan = solve->scan;
@@ -33,7 +34,7 @@ InputBody run(const WorkOrder& order) {
       return PlanDone{std::make_shared<const Prepared>(std::move(*prepared))};
     }
     case WorkKind::Pass: {
-      auto pass = plan_next_pass(*order.setup, *order.job, *order.prepared, order.before->found);
+      auto pass = plan_next_pass(*order.setup, *order.job, *order.prepared, *order.before, order.pass);
       if (!pass.ok()) return PassPlanned{pass.error()};
       return PassPlanned{std::make_shared<const NextPass>(std::move(*pass))};
     }

@@ -15,12 +15,15 @@ constexpr double kOnEdge_mm = 1.5;
 /// A crossing is seen when a point of its sign lies this close to it.
 constexpr double kSeenAt_mm = 5;
 constexpr double kMinAcross = 0.35;
-constexpr double kEndMargin_mm = 3;
+/// A joint of members that are a little off is closed to the beam all the same.
+constexpr double kClosed_mm = 2;
+/// Beam and noise decide nearer to the end of an edge.
+constexpr double kLeastEndMargin_mm = 1.5;
 /// A side tells nothing about a step against it, nor along it.
 constexpr double kAgainst = -0.15;
 constexpr double kRoom_mm = 10;
 /// Members farther apart than this hide nothing of each other.
-constexpr double kBeside_mm = 2;
+constexpr double kBeside_mm = 4;
 /// Below this nothing is worth a closer look.
 constexpr double kHopeless_nats = 3;
 
@@ -96,8 +99,12 @@ Alternatives::Alternatives(const workpiece::OutlineTemplate& outline, const std:
 }
 
 Alternatives::Region Alternatives::around(std::size_t member) const {
+  return inside(grown(bounds(members_[member]), kMost_mm + kRoom_mm));
+}
+
+Alternatives::Region Alternatives::inside(const Box2& box) const {
   Region out;
-  out.box = grown(bounds(members_[member]), kMost_mm + kRoom_mm);
+  out.box = box;
   std::copy_if(spots_.begin(), spots_.end(), std::back_inserter(out.spots),
                [&](const Spot& s) { return in_box(s.place, out.box); });
   std::copy_if(pieces_.begin(), pieces_.end(), std::back_inserter(out.pieces), [&](const Piece& p) {
@@ -118,7 +125,7 @@ int Alternatives::unseen_on(const std::vector<VisibleEdge>& edges, const Region&
       if ((from < 0) == (to < 0) || std::abs(to - from) < kMinAcross * (b - a).norm()) continue;
       const Vec2 at = a + from / (from - to) * (b - a);
       const double along = at.dot(d);
-      if (along < kEndMargin_mm || along > length - kEndMargin_mm) continue;
+      if (along < region.end_margin_mm || along > length - region.end_margin_mm) continue;
       const Vec2 place = edge.line.a + at;
       if (!in_box(place, region.box)) continue;
       bool seen = false;
@@ -133,8 +140,8 @@ int Alternatives::unseen_on(const std::vector<VisibleEdge>& edges, const Region&
   return out;
 }
 
-std::vector<VisibleEdge> Alternatives::visible(const std::vector<Polygon>& members,
-                                               std::size_t member) const {
+std::vector<VisibleEdge> Alternatives::visible(const std::vector<Polygon>& members, std::size_t member,
+                                               double joint_gap_mm) const {
   // Only what lies beside a member hides anything of it; the order of the others stays, since it decides who
   // shows a piece that two share.
   if (members[member].empty()) return {};
@@ -146,18 +153,17 @@ std::vector<VisibleEdge> Alternatives::visible(const std::vector<Polygon>& membe
     if (m == member) own = beside.size();
     beside.push_back(members[m]);
   }
-  std::vector<VisibleEdge> out = workpiece::visible_edges(beside, own);
+  std::vector<VisibleEdge> out = workpiece::visible_edges(beside, own, joint_gap_mm);
   for (VisibleEdge& edge : out) edge.member = static_cast<int>(member);
   return out;
 }
 
 bool Alternatives::is_drawn(const std::vector<Polygon>& members, std::size_t member) const {
-  return members[member].size() == members_[member].size() &&
-         (members[member].empty() || members[member].front() == members_[member].front());
+  return members[member] == members_[member];
 }
 
 std::vector<VisibleEdge> Alternatives::edges_within(const std::vector<Polygon>& members,
-                                                    const Box2& box) const {
+                                                    const Region& region) const {
   // Where a member is not as drawn here, what is beside its old or its new place may show other edges.
   std::vector<Box2> changed;
   for (std::size_t m = 0; m < members.size(); ++m) {
@@ -170,14 +176,15 @@ std::vector<VisibleEdge> Alternatives::edges_within(const std::vector<Polygon>& 
     if (members[m].empty()) continue;
     const bool drawn = is_drawn(members, m);
     const Box2 own = drawn ? boxes_[m] : bounds(members[m]);
-    if (apart(own, box)) continue;
+    if (apart(own, region.box)) continue;
     const bool anew =
-        !drawn || std::any_of(changed.begin(), changed.end(), [&](const Box2& c) { return !apart(own, c); });
+        !drawn || region.joint_gap_mm != kJointGap_mm ||
+        std::any_of(changed.begin(), changed.end(), [&](const Box2& c) { return !apart(own, c); });
     if (anew) {
-      for (const VisibleEdge& edge : visible(members, m)) edges.push_back(edge);
+      for (const VisibleEdge& edge : visible(members, m, region.joint_gap_mm)) edges.push_back(edge);
       continue;
     }
-    if (!drawn_[m]) drawn_[m] = visible(members_, m);
+    if (!drawn_[m]) drawn_[m] = visible(members_, m, kJointGap_mm);
     edges.insert(edges.end(), drawn_[m]->begin(), drawn_[m]->end());
   }
   return edges;
@@ -205,7 +212,7 @@ double Alternatives::explained_nats(const std::vector<VisibleEdge>& edges, const
 }
 
 double Alternatives::score(const std::vector<Polygon>& members, const Region& region) const {
-  const std::vector<VisibleEdge> edges = edges_within(members, region.box);
+  const std::vector<VisibleEdge> edges = edges_within(members, region);
   return explained_nats(edges, region) - unseen_nats_ * unseen_on(edges, region);
 }
 
@@ -213,7 +220,14 @@ double Alternatives::whole() const {
   Region all;
   all.box = {Vec2::Constant(-1e9), Vec2::Constant(1e9)};
   all.spots = spots_;
-  return explained_nats(edges_within(members_, all.box), all);
+  return explained_nats(edges_within(members_, all), all);
+}
+
+double Alternatives::gain(const std::vector<Polygon>& instead, const Box2& within) const {
+  Region region = inside(grown(within, kSeenAt_mm));
+  region.end_margin_mm = kLeastEndMargin_mm;
+  region.joint_gap_mm = kClosed_mm;
+  return score(instead, region) - score(members_, region);
 }
 
 double Alternatives::missing(int member) const {
@@ -311,7 +325,8 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
   Region region = around(m);
   const std::vector<Vote> found = votes(m, region, anywhere);
   const int bared = bared_by(m, region);
-  const double lost = unseen_[m] > 0 ? unseen_nats_ * unseen_on(visible(members_, m), region) : 0;
+  const double lost =
+      unseen_[m] > 0 ? unseen_nats_ * unseen_on(visible(members_, m, kJointGap_mm), region) : 0;
 
   struct Trial {
     Vec2 shift;
@@ -338,7 +353,7 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
     const double most = point_nats_ * (trial.points + bared) + lost;
     if (trial.shift.norm() < kLeast_mm || most < kHopeless_nats) continue;
     members[m] = shifted(members_[m], trial.shift);
-    if (most - unseen_nats_ * unseen_on(visible(members, m), region) < kHopeless_nats) continue;
+    if (most - unseen_nats_ * unseen_on(visible(members, m, kJointGap_mm), region) < kHopeless_nats) continue;
     if (!drawn_known) region.drawn_nats = score(members_, region), drawn_known = true;
     const double gain = score(members, region) - region.drawn_nats;
     if (gain > best.gain_nats) best = {member, trial.shift, trial.points, gain};

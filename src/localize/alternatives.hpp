@@ -34,12 +34,21 @@ class Alternatives {
   /// Log-likelihood of a part without the member over the drawing as it is, nats.
   double missing(int member) const;
 
+  /// Log-likelihood, over the drawing as it is, of a part whose members are these and differ from it within
+  /// the box only, nats.
+  double gain(const std::vector<Polygon>& instead, const Box2& within) const;
+  /// The members' outlines where the fit has them, frame Part.
+  const std::vector<Polygon>& members() const { return members_; }
+
   /// Log-likelihood of the points alone, with the members where the fit has them, up to what all fits of the
   /// same crossings share, nats. Sides that a member pulled off its joint lays bare count as edges here, but
   /// nobody has to have seen them: a narrow slot hides both of its sides.
   double whole() const;
 
   static constexpr double kLeast_mm = 4, kMost_mm = 60;
+
+  /// Of the template: sides closer than this to another member hide in a joint.
+  static constexpr double kJointGap_mm = 0.5;
 
  private:
   struct Spot {
@@ -59,16 +68,20 @@ class Alternatives {
     Box2 box;
     std::vector<Spot> spots;  ///< by x
     std::vector<Piece> pieces;
-    double drawn_nats = 0;  ///< score of the drawing as it is
+    double joint_gap_mm = kJointGap_mm;  ///< sides closer than this to another member hide in a joint
+    double end_margin_mm = 3;            ///< crossings nearer to an edge's end are not promised
+    double drawn_nats = 0;               ///< score of the drawing as it is
   };
 
   Region around(std::size_t member) const;
+  Region inside(const Box2& box) const;
   std::vector<workpiece::VisibleEdge> edges_within(const std::vector<Polygon>& members,
-                                                   const Box2& box) const;
+                                                   const Region& region) const;
   /// Whether the member lies where members_ has it.
   bool is_drawn(const std::vector<Polygon>& members, std::size_t member) const;
   /// The edges that a member of the drawing shows.
-  std::vector<workpiece::VisibleEdge> visible(const std::vector<Polygon>& members, std::size_t member) const;
+  std::vector<workpiece::VisibleEdge> visible(const std::vector<Polygon>& members, std::size_t member,
+                                              double joint_gap_mm) const;
   double explained_nats(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
   double score(const std::vector<Polygon>& members, const Region& region) const;
   int unseen_on(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;

@@ -41,6 +41,7 @@ std::string wrong_option(const LocalizeOptions& o) {
         Limit{"range_rad", o.range_rad, 0, 1e3}, Limit{"max_offset_mm", o.max_offset_mm, 0, kNoLimit},
         Limit{"max_rotation_rad", o.max_rotation_rad, 0, kNoLimit},
         Limit{"max_member_shift_mm", o.max_member_shift_mm, 0, kNoLimit},
+        Limit{"prove_shift_mm", o.prove_shift_mm, o.prove_shift_mm == 0 ? 0.0 : 6.0, 100},
         Limit{"max_mean_error_mm", o.max_mean_error_mm, 0, kNoLimit},
         Limit{"latency_sigma_s", o.latency_sigma_s, 0, 1}, Limit{"inset_sigma_mm", o.inset_sigma_mm, 0, 100},
         Limit{"member_shift_sigma_mm", o.member_shift_sigma_mm, 0, 100},

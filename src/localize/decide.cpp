@@ -8,9 +8,11 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <optional>
 
 #include "alternatives.hpp"
 #include "chance.hpp"
+#include "proof.hpp"
 #include "weldcell/base/units.hpp"
 #include "wording.hpp"
 
@@ -92,7 +94,13 @@ std::vector<Crossing> mirrored(const std::vector<Crossing>& crossings, const Vec
 bool explained_elsewhere(const Situation& s, Localization& result) {
   const Vec2 planned = s.options.planned * s.outline.centroid;
   const double reach = std::min(1.5 * s.options.range_mm + 50, 400.0);
-  const double here = rough_log_likelihood(s.fields, sampled(s.crossings, 400), s.fit.state) + kClearly_nats;
+  // Members as drawn on either side of the comparison, and each pose where it then fits best.
+  const std::vector<Crossing> sample = sampled(s.crossings, 400);
+  FitState rigid = s.fit.state;
+  std::fill(rigid.members.begin(), rigid.members.end(), MemberShift::Zero());
+  const FitState settled = polish(s.fields, sampled(s.crossings, kSearchPoints), rigid.pose, 12, nullptr);
+  const double here = kClearly_nats + std::max(rough_log_likelihood(s.fields, sample, rigid),
+                                               rough_log_likelihood(s.fields, sample, settled));
   // The mirror line runs through the planned origin, so a part drawn about its origin keeps its place.
   const SearchBox anywhere{{planned, s.options.planned.theta_rad}, reach, kPi, Vec2(-s.outline.centroid)};
   FitState outside, mirror;
@@ -101,28 +109,27 @@ bool explained_elsewhere(const Situation& s, Localization& result) {
       best_elsewhere(s, mirrored(s.crossings, s.options.planned.translation()), anywhere, &mirror);
   if (std::max(of_outside, of_mirror) <= here) return false;
   const double turn = wrap_pi(outside.pose.theta_rad - s.options.planned.theta_rad);
-  // A part that only lies too far off is not called mirrored, even where its drawing is nearly its own mirror
-  // image.
-  const bool shifted_only = of_outside > here && std::abs(turn) <= s.options.range_rad + rad(2);
-  if (of_mirror > of_outside + (shifted_only ? kAmbiguous_nats : -kAmbiguous_nats)) {
-    const bool either = of_outside > of_mirror - kAmbiguous_nats;
+  // What a place outside the range explains as well is no mirror image: the drawing may be its own one.
+  if (of_mirror > of_outside + kAmbiguous_nats) {
     say(result, Verdict::Reject, "mirrored",
-        fmt::format("The part is the mirror image of drawing {}{}. Turn it over or load the mirrored job.",
-                    s.outline.name, either ? " (or lies turned by " + degrees(turn) + ")" : ""));
+        fmt::format("The part is the mirror image of drawing {}. Turn it over or load the mirrored job.",
+                    s.outline.name));
     return true;
   }
+  const bool either =
+      of_mirror > of_outside - kAmbiguous_nats && std::abs(turn) > s.options.range_rad + rad(2);
   say(result, Verdict::Reject, "out_of_range",
       fmt::format(
-          "The part lies {} and {} away from its planned place, outside the allowed range. Move it to the "
-          "projected outline and scan again.",
-          millimetres((outside.pose.centre - planned).norm()), degrees(turn)));
+          "The part lies {} and {} away from its planned place, outside the allowed range{}. Move it to "
+          "the projected outline and scan again.",
+          millimetres((outside.pose.centre - planned).norm()), degrees(turn),
+          either ? ", or is the mirror image of drawing " + s.outline.name + ", which looks the same" : ""));
   return true;
 }
 
 /// A member that points and travel find at another place, or not at all.
-bool member_elsewhere(const Situation& s, Localization& result) {
+bool member_elsewhere(const Situation& s, const Alternatives& alternatives, Localization& result) {
   const std::vector<int> unseen = unseen_members(s.evidence);
-  const Alternatives alternatives(s.outline, s.crossings, s.path, s.fit, s.evidence);
   Displacement best;
   for (int m = 0; m < static_cast<int>(s.evidence.members.size()); ++m) {
     const bool hardly_seen = std::find(unseen.begin(), unseen.end(), m) != unseen.end();
@@ -182,10 +189,34 @@ bool member_off(const Situation& s, Localization& result) {
   return false;
 }
 
-bool wrong_part(const Situation& s, Localization& result) {
-  if (suspicious(s, result) && explained_elsewhere(s, result)) return true;
-  if (s.evidence.has_path && member_elsewhere(s, result)) return true;
-  return member_off(s, result);
+bool wrong_part(const Situation& s, const Alternatives* alternatives, Localization& result) {
+  const bool looked = suspicious(s, result);
+  if (looked && explained_elsewhere(s, result)) return true;
+  if (!(alternatives != nullptr && member_elsewhere(s, *alternatives, result)) && !member_off(s, result))
+    return false;
+  // A nearly symmetric part turned by half a turn fits but for a member or two.
+  if (!looked) explained_elsewhere(s, result);
+  return true;
+}
+
+/// What could be other than drawn without this scan having shown it.
+bool not_looked_at(const Situation& s, const Alternatives& alternatives, Localization& result) {
+  const std::vector<Unproven> open = unproven(s, alternatives);
+  if (open.empty()) return false;
+  for (const Unproven& u : open) {
+    const auto m = static_cast<std::size_t>(u.departure.member);
+    result.rescan.push_back({s.outline.member_names[m], u.pass.a, u.pass.b});
+  }
+  const Unproven& first = open.front();
+  const std::string more =
+      open.size() > 1 ? fmt::format(", and {} more line{}", open.size() - 1, open.size() > 2 ? "s" : "") : "";
+  say(result, Verdict::Rescan, "not_looked_at",
+      fmt::format(
+          "The {} was not looked at: it could be off by {} without the scan showing it. Scan across it "
+          "from ({:.0f}, {:.0f}) to ({:.0f}, {:.0f}) on the drawing{}.",
+          place_name(s.outline, first.departure), millimetres(s.options.prove_shift_mm), first.pass.a.x(),
+          first.pass.a.y(), first.pass.b.x(), first.pass.b.y(), more));
+  return true;
 }
 
 /// The edge whose crossing would tell most about the worst known direction.
@@ -329,7 +360,10 @@ double path_log_likelihood(const Evidence& evidence) {
 
 void decide(const Situation& s, Localization& result) {
   const auto total = static_cast<double>(s.crossings.size());
-  if (s.options.full_reject_checks && wrong_part(s, result)) return;
+  std::optional<Alternatives> alternatives;
+  if (s.options.full_reject_checks && s.evidence.has_path)
+    alternatives.emplace(s.outline, s.crossings, s.path, s.fit, s.evidence);
+  if (s.options.full_reject_checks && wrong_part(s, alternatives ? &*alternatives : nullptr, result)) return;
   if (result.inliers < kMinInlierShare * total || (s.evidence.has_path && s.evidence.rate < kMinRate)) {
     say(result, Verdict::Reject, "clutter",
         fmt::format("Only {} of {} edge points lie on the part as drawn. Clear the table of other things, "
@@ -341,6 +375,7 @@ void decide(const Situation& s, Localization& result) {
   if (too_vague(s, result) || hangs_on_few(s, result)) return;
   if (s.options.full_reject_checks && ambiguous(s, result)) return;
   if (out_of_range(s, result)) return;
+  if (alternatives && s.options.prove_shift_mm > 0 && not_looked_at(s, *alternatives, result)) return;
   say(result, Verdict::Weld, "ok",
       fmt::format("The part was found with {} of {} edge points; its place is known to {} and {}.",
                   result.inliers, s.crossings.size(),

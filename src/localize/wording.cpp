@@ -15,12 +15,15 @@ std::string degrees(double angle_rad) {
   return fmt::format("{:.{}f} deg", value, std::abs(value) < 10 ? 1 : 0);
 }
 
+std::string side_word(const Vec2& outward) {
+  const bool sideways = std::abs(outward.x()) > std::abs(outward.y());
+  return sideways ? (outward.x() > 0 ? "right" : "left") : (outward.y() > 0 ? "upper" : "lower");
+}
+
 std::string edge_name(const workpiece::OutlineTemplate& outline, int edge) {
   const workpiece::VisibleEdge& e = outline.edges[static_cast<std::size_t>(edge)];
-  const bool sideways = std::abs(e.outward.x()) > std::abs(e.outward.y());
-  const char* which =
-      sideways ? (e.outward.x() > 0 ? "right" : "left") : (e.outward.y() > 0 ? "upper" : "lower");
-  return fmt::format("{} edge of {}", which, outline.member_names[static_cast<std::size_t>(e.member)]);
+  return fmt::format("{} edge of {}", side_word(e.outward),
+                     outline.member_names[static_cast<std::size_t>(e.member)]);
 }
 
 std::string direction_on_drawing(const Vec2& shift_mm) {

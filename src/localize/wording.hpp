@@ -11,6 +11,9 @@ namespace weldcell::localize {
 std::string millimetres(double mm);
 std::string degrees(double rad);
 
+/// "upper", "lower", "left" or "right": where a side with this outward normal lies on the drawing.
+std::string side_word(const Vec2& outward);
+
 /// "upper edge of rail_L" - as on the drawing.
 std::string edge_name(const workpiece::OutlineTemplate& outline, int edge);
 

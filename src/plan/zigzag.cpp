@@ -6,6 +6,7 @@
 
 #include "patterns.hpp"
 #include "weldcell/base/units.hpp"
+#include "weldcell/workpiece/departures.hpp"
 
 namespace weldcell::plan {
 
@@ -133,13 +134,53 @@ std::vector<double> positions_of(const Strip& strip, const Inspection& inspectio
 struct Planned {
   Strip strip;
   std::vector<double> positions;
+  std::vector<Segment> low_ends, high_ends;  ///< passes over the members' ends, at either end of the strip
 };
+
+/// Departures of an end that its pass is laid for: by the second where the first stays under another member.
+constexpr double kEndDepartures_mm[] = {10, 20};
+
+/// Passes that show where the member's ends are: along the member, over the end or over the joint that hides
+/// it, where an end too far back would leave a slot.
+void add_end_passes(const workpiece::OutlineTemplate& outline, std::size_t member, Planned& planned) {
+  const std::vector<Polygon>& members = outline.members;
+  const Vec2 middle = centroid(members[member]);
+  std::vector<int> sides;
+  for (const double by_mm : kEndDepartures_mm) {
+    for (const workpiece::Departure& d : workpiece::departures(members, outline.edges, member, by_mm, true)) {
+      if (!d.end || std::find(sides.begin(), sides.end(), d.side) != sides.end()) continue;
+      const std::optional<Segment> pass = workpiece::telling_pass(members, d);
+      if (!pass) continue;
+      sides.push_back(d.side);
+      const bool high = ((pass->a + pass->b) / 2 - middle).dot(planned.strip.along) > 0;
+      (high ? planned.high_ends : planned.low_ends).push_back(*pass);
+    }
+  }
+}
 
 Vec2 axis_point(const Planned& p, double position) {
   return position * p.strip.along + p.strip.centre * p.strip.across;
 }
 
+/// Each pass from the side where the beam already is; the receiver looks along the edges that it crosses.
+void append_end_passes(const Planned& member, bool high, std::vector<BeamPath>& out) {
+  int number = high && !member.low_ends.empty() ? 2 : 1;
+  for (Segment pass : high ? member.high_ends : member.low_ends) {
+    if (!out.empty()) {
+      const Vec2& at = out.back().points.back();
+      if ((pass.b - at).norm() < (pass.a - at).norm()) std::swap(pass.a, pass.b);
+    }
+    BeamPath path;
+    path.name = fmt::format("{} end {}", member.strip.name, number++);
+    path.points = {pass.a, pass.b};
+    const Vec2 d = pass.direction();
+    path.receiver_angle_rad = std::atan2(d.x(), -d.y());
+    out.push_back(std::move(path));
+  }
+}
+
 void append_passes(const Planned& member, bool backwards, double span_mm, std::vector<BeamPath>& out) {
+  append_end_passes(member, backwards, out);
   std::vector<double> order = member.positions;
   if (backwards) std::reverse(order.begin(), order.end());
   const Vec2 half = span_mm / 2 * member.strip.across;
@@ -156,6 +197,7 @@ void append_passes(const Planned& member, bool backwards, double span_mm, std::v
     out.push_back(std::move(path));
     sense = -sense;
   }
+  append_end_passes(member, !backwards, out);
 }
 
 }  // namespace
@@ -168,7 +210,8 @@ std::vector<BeamPath> zigzag_paths(const workpiece::Workpiece& workpiece, const 
     Strip strip = strip_of(*outline, m);
     if (strip.free.empty()) continue;
     std::vector<double> positions = positions_of(strip, inspection);
-    open.push_back({std::move(strip), std::move(positions)});
+    open.push_back({std::move(strip), std::move(positions), {}, {}});
+    add_end_passes(*outline, m, open.back());
   }
   std::vector<BeamPath> out;
   bool first = true;

@@ -71,13 +71,15 @@ struct Solution {
 Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared& prepared,
                const ScanRecord& scan, const Evidence& before);
 
-/// The pass after the first: zigzag at the found pose, every member from both sides.
+/// The pass after the first, at the found pose. Where the pose stands and nothing is asked for but lines that
+/// the last pass did not look along, these lines; else a zigzag over every member from both
+/// sides and over its ends. The second pass of an adaptive inspection is that zigzag.
 struct NextPass {
   std::vector<plan::BeamPath> paths;
   std::shared_ptr<const plan::MotionPlan> scan;
 };
 Result<NextPass> plan_next_pass(const cell::CellSetup& cell, const JobInput& job, const Prepared& prepared,
-                                const localize::Localization& found);
+                                const Solution& before, int pass);
 
 /// Passes that a job may take before a rescan verdict becomes its end.
 int max_passes(const JobOrder& order);

@@ -17,6 +17,7 @@ struct WorkOrder {
   std::shared_ptr<const JobInput> job;
   std::shared_ptr<const Prepared> prepared;
   std::shared_ptr<const Solution> before;
+  int pass = 0;  ///< the one to plan, from 2 on; of WorkKind::Pass only
   std::shared_ptr<const ScanRecord> scan;
 };
 

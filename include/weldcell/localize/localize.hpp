@@ -30,6 +30,10 @@ struct LocalizeOptions {
   double member_shift_sigma_mm = 0.5;  ///< drawing's tolerance of a member's place, prior of the member term
   double member_angle_sigma_rad = 0.0022;
   double max_member_shift_mm = 3;  ///< acceptance: a member farther off than this is another revision
+  /// Each member's sides, place along itself, direction and closed joints must be shown to be nearer to the
+  /// drawing than this, else the verdict is rescan; 0: not asked, else 6..100. Needs a path.
+  double prove_shift_mm = 20;
+  bool prove_free_ends = false;    ///< also that no end in the open is longer or shorter by as much
   double max_mean_error_mm = 2.5;  ///< the paper's rule, used by Method::Paper
   bool full_reject_checks = true;  ///< negative evidence and second modes
 };
@@ -43,6 +47,12 @@ struct MemberPose {
   int points = 0;
 };
 
+/// One straight pass of the beam that would show what this scan did not look at.
+struct ScanLine {
+  std::string member;
+  Vec2 from = Vec2::Zero(), to = Vec2::Zero();  ///< frame Part, mm
+};
+
 struct Alternative {
   Pose2 pose;
   double mean_error_mm = 0;
@@ -53,10 +63,11 @@ struct Alternative {
 struct Localization {
   Verdict verdict = Verdict::Reject;
   /// Stable code. weld: "ok". rescan: "too_few_points", "one_line" (all points on one straight line),
-  /// "not_enough" (a direction of the pose stays open), "ambiguous". reject: "mirrored", "out_of_range",
-  /// "clutter", "no_fit", "bad_points", "bad_path", "bad_options" (what is no number or no sensible one),
-  /// "mean_error" (Method::Paper). rescan where the evidence is weak, else reject: "wrong_revision",
-  /// "member_missing".
+  /// "not_enough" (a direction of the pose stays open), "ambiguous", "not_looked_at" (a member could be other
+  /// than drawn without the scan having shown it; `rescan` says where to look). reject: "mirrored",
+  /// "out_of_range", "clutter", "no_fit", "bad_points", "bad_path", "bad_options" (what is no number or no
+  /// sensible one), "mean_error" (Method::Paper). rescan where the evidence is weak, else reject:
+  /// "wrong_revision", "member_missing".
   std::string cause;
   std::string reason;  ///< in a welder's words, with one action
   Pose2 pose;          ///< Part in Base
@@ -70,6 +81,7 @@ struct Localization {
   double inset_mm = 0;
   std::vector<Alternative> alternatives;
   std::vector<MemberPose> members;
+  std::vector<ScanLine> rescan;  ///< what settles "not_looked_at": all of these
   int iterations = 0;
 };
 

@@ -73,6 +73,7 @@ void accuracy_cell(Book& book, const Case& c, const PartUnderTest& part, std::ui
   if (c.modelled()) {
     book.add(name + " false reject", t.share(t.false_reject), "%", paper.share(paper.false_reject), 5,
              Better::Lower, t.share_error(t.false_reject));
+    book.add(name + " asked for another scan", t.share(t.again), "%", NAN, NAN, Better::None);
     book.add(name + " success", t.share(t.success), "%", paper.share(paper.success), 99.5, Better::Higher);
     sums.accepted_wrong += t.false_accept;
     sums.trials += t.trials;
@@ -101,6 +102,7 @@ void extreme_cell(Book& book, const PartUnderTest& part, std::uint64_t seed) {
   book.add(name + " basin", t.share(t.basin), "%", NAN, 99.9, Better::Higher);
   book.add(name + " false accept", t.share(t.false_accept), "%", NAN, 0.1);
   book.add(name + " false reject", t.share(t.false_reject), "%", NAN, 5);
+  book.add(name + " asked for another scan", t.share(t.again), "%", NAN, NAN, Better::None);
   book.add(name + " time median", t.milliseconds(0.5), "ms", NAN, 15);
 }
 

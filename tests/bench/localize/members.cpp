@@ -3,8 +3,8 @@
 #include <random>
 
 #include "book.hpp"
+#include "planned_scan.hpp"
 #include "weldcell/base/units.hpp"
-#include "weldcell/plan/scan_plan.hpp"
 #include "weldcell/weld/certificate.hpp"
 
 namespace weldcell::bench {
@@ -91,17 +91,6 @@ void rail_along(Book& book) {
            Better::None);
 }
 
-std::vector<PathPiece> product_zigzag(const workpiece::Workpiece& w, const Pose2& planned) {
-  std::vector<PathPiece> out;
-  for (const plan::BeamPath& line : plan::beam_paths(w, planned, plan::Inspection{}, plan::Pattern::Zigzag)) {
-    for (std::size_t i = 1; i < line.points.size(); ++i) {
-      const Vec2 &a = line.points[i - 1], &b = line.points[i];
-      out.push_back({a.x(), a.y(), b.x(), b.y()});
-    }
-  }
-  return out;
-}
-
 struct GapScan {
   const char* name;
   bool zigzag;
@@ -115,8 +104,7 @@ void joint_gaps(Book& book, const GapScan& scan) {
   const std::string name = std::string("joint gap ") + scan.name;
   if (!book.wanted(name)) return;
   const PartUnderTest& part = book.unseen.back();
-  const std::vector<PathPiece> path =
-      scan.zigzag ? product_zigzag(part.workpiece, {}) : std::vector<PathPiece>{};
+  const std::vector<PathPiece> path = scan.zigzag ? planned_scan(part.workpiece) : std::vector<PathPiece>{};
   Setting s;
   s.shift_mm = 8, s.turn_deg = 0.5, s.inset_mm = 0.4;
   std::mt19937_64 random(book.options.seed + 2);

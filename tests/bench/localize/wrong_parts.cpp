@@ -1,4 +1,5 @@
 // Parts that are not the part of the drawing, or lie turned: what is accepted, and which cause is named.
+#include <cstring>
 #include <random>
 
 #include "book.hpp"
@@ -32,10 +33,15 @@ void count(Counts& counts, const Localization& found, const char* cause, std::ui
            const std::string& what) {
   ++counts.trials;
   const bool accepted = found.verdict == Verdict::Weld;
+  // A drawing that is its own mirror image, turned by half a turn, has both for one cause: the words name
+  // both.
+  const bool named =
+      cause != nullptr && (found.cause == cause || (std::strcmp(cause, "mirrored") == 0 &&
+                                                    found.reason.find("mirror image") != std::string::npos));
   counts.accepted += accepted;
-  counts.named += cause != nullptr && found.cause == cause;
+  counts.named += named;
   ++counts.causes[found.cause];
-  if (accepted || (cause != nullptr && found.cause != cause))
+  if (accepted || (cause != nullptr && !named))
     counts.wrong.push_back((accepted ? "accepted: " : found.cause + ": ") + what + ", seed " +
                            std::to_string(seed));
 }

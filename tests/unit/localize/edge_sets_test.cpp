@@ -39,6 +39,11 @@ TEST_P(EdgeSets, PoseIsFoundWithinAMillimetreAndAFifthOfADegree) {
     if (std::string(kind) == "missing") {
       EXPECT_NE(found.verdict, Verdict::Weld) << name << "/" << kind << "/" << i;
       EXPECT_EQ(found.cause, "member_missing") << name << "/" << kind << "/" << i << found.reason;
+    } else if (found.cause == "not_looked_at") {
+      // Lines 40 mm apart may pass a joint of a member as wide by; of these sets two do.
+      EXPECT_TRUE(std::string(kind) == "lat8spi" || std::string(kind) == "var1") << found.reason;
+      EXPECT_EQ(found.verdict, Verdict::Rescan);
+      EXPECT_FALSE(found.rescan.empty());
     } else {
       EXPECT_EQ(found.verdict, Verdict::Weld)
           << name << "/" << kind << "/" << i << ": " << found.cause << ": " << found.reason;

@@ -1,15 +1,19 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "unit/plan/demo_cell.hpp"
 #include "weldcell/plan/scan_plan.hpp"
+#include "weldcell/workpiece/departures.hpp"
 
 namespace weldcell::plan {
 namespace {
 
 std::string member_of(const BeamPath& path) { return path.name.substr(0, path.name.find(' ')); }
+
+bool over_an_end(const BeamPath& path) { return path.name.find(" end ") != std::string::npos; }
 
 int crossings(const BeamPath& path, const Segment& edge) {
   int count = 0;
@@ -44,6 +48,7 @@ TEST(Zigzag, CrossesBothLongSidesOfEveryMemberInBothDirections) {
     inspection.passes_per_member = 4;
     std::map<std::string, std::vector<Vec2>> directions;
     for (const BeamPath& path : beam_paths(c.workpiece, c.pose, inspection, Pattern::Zigzag)) {
+      if (over_an_end(path)) continue;
       SCOPED_TRACE(path.name);
       ASSERT_EQ(path.points.size(), 2u);
       const Segment line{path.points[0], path.points[1]};
@@ -79,6 +84,7 @@ TEST(Zigzag, IsCentredOnTheAxisAndSpreadAlongIt) {
   inspection.passes_per_member = 4;
   std::vector<double> along;
   for (const BeamPath& path : beam_paths(testing::ladder(), {}, inspection, Pattern::Zigzag)) {
+    if (over_an_end(path)) continue;
     const Vec2 middle = (path.points[0] + path.points[1]) / 2;
     if (member_of(path) == "rail_L") {
       EXPECT_NEAR(middle.y(), 20, 1e-9);
@@ -95,12 +101,53 @@ TEST(Zigzag, IsCentredOnTheAxisAndSpreadAlongIt) {
     EXPECT_NEAR(along[i] - along[i - 1], 1060 / 3.0, 80) << "moved farther than a joint needs";
 }
 
+/// Whether the pass meets a place other than at its ends, mm aside at most.
+bool runs_over(const BeamPath& path, const Vec2& place) {
+  const Segment line{path.points[0], path.points[1]};
+  return distance(place, line) < 0.5 && (place - line.a).norm() > 20 && (place - line.b).norm() > 20;
+}
+
+TEST(Zigzag, RunsOverTheMiddleOfEveryEndWhetherOpenOrInAJoint) {
+  for (const Case& c : cases()) {
+    SCOPED_TRACE(c.name);
+    std::map<std::string, int> ends;
+    const std::vector<BeamPath> paths = beam_paths(c.workpiece, c.pose, {}, Pattern::Zigzag);
+    for (const BeamPath& path : paths) {
+      if (!over_an_end(path)) continue;
+      ASSERT_EQ(path.points.size(), 2u);
+      ++ends[member_of(path)];
+    }
+    for (const workpiece::Member& member : c.workpiece.members) {
+      SCOPED_TRACE(member.name);
+      EXPECT_EQ(ends[member.name], 2);
+      for (std::size_t k = 0; k < member.outline.size(); ++k) {
+        if (!workpiece::is_end(member.outline, k)) continue;
+        const Vec2 middle = (member.outline[k] + member.outline[(k + 1) % member.outline.size()]) / 2;
+        EXPECT_TRUE(std::any_of(paths.begin(), paths.end(),
+                                [&](const BeamPath& path) {
+                                  return over_an_end(path) && member_of(path) == member.name &&
+                                         runs_over(path, c.pose * middle);
+                                }))
+            << "end " << k;
+      }
+    }
+  }
+}
+
+TEST(Zigzag, EndPassesAddLessThanAThirdToThePath) {
+  double ends = 0, others = 0;
+  for (const BeamPath& path : beam_paths(testing::ladder(), {}, {}, Pattern::Zigzag))
+    (over_an_end(path) ? ends : others) += (path.points[1] - path.points[0]).norm();
+  EXPECT_GT(ends, 0);
+  EXPECT_LT(ends, others / 3);
+}
+
 TEST(Zigzag, PitchSetsTheNumberOfPasses) {
   Inspection inspection;
   inspection.pitch_mm = 40;
   std::map<std::string, int> count;
   for (const BeamPath& path : beam_paths(testing::ladder(), {}, inspection, Pattern::Zigzag))
-    ++count[member_of(path)];
+    if (!over_an_end(path)) ++count[member_of(path)];
   EXPECT_EQ(count.size(), 6u);
   for (const auto& [member, passes] : count) {
     EXPECT_EQ(passes % 2, member.starts_with("rung") ? 0 : passes % 2) << member;

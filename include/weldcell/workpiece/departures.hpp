@@ -1,0 +1,46 @@
+// How a part may differ from its drawing by one side or one member's direction, and where a straight pass of
+// the beam would tell. Pure.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "weldcell/workpiece/outline_template.hpp"
+
+namespace weldcell::workpiece {
+
+/// One member other than drawn: a side moved along its normal (longer, shorter, wider, narrower), the member
+/// shifted along itself, or turned about one of its ends.
+struct Departure {
+  int member = -1;
+  int side = -1;       ///< the side that moves, of a shift the end that it moves away from; -1: turned
+  bool whole = false;  ///< the member is shifted
+  bool end = false;    ///< an end of the member: the side runs across its longest one
+  Vec2 outward{0, 0};  ///< unit; of the side, or of the end that swings
+  Polygon instead;     ///< the member's outline then, frame Part
+  Box2 reach;          ///< what is other than drawn lies in here
+};
+
+/// All departures of one member by by_mm (at the swinging end of a turn); `visible` are the visible edges of
+/// the part as drawn. Ends in the open move only with their member unless free_ends: a longer or shorter one
+/// changes no joint. Left out are sides shorter than 8 mm, what would leave less than half of the member, and
+/// sides that would move out through a joint that hides most of them: there another member is.
+std::vector<Departure> departures(std::span<const Polygon> members, std::span<const VisibleEdge> visible,
+                                  std::size_t member, double by_mm, bool free_ends);
+
+/// Whether a side of the outline is an end: it runs across the longest one.
+bool is_end(const Polygon& outline, std::size_t side);
+
+/// How many crossings on a straight pass tell the two outlines apart: edges that only the one has there.
+/// Crossings that graze an edge, or lie within 3 mm of its end, count for nothing; edges of the same side
+/// within 5 mm count as one.
+int crossings_that_tell(std::span<const VisibleEdge> drawn, std::span<const VisibleEdge> instead,
+                        const Segment& pass);
+
+/// The shortest pass, frame Part, that tells the departure from the drawing by at least two crossings: square
+/// across the side, or across both sides of the end that swings, with room before the first edge and behind
+/// the last. Nothing when from above both are one part, as where an end grows into a joint.
+std::optional<Segment> telling_pass(std::span<const Polygon> members, const Departure& departure);
+
+}  // namespace weldcell::workpiece
