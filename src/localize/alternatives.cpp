@@ -23,7 +23,7 @@ constexpr double kLeastEndMargin_mm = 1.5;
 constexpr double kAgainst = -0.15;
 constexpr double kRoom_mm = 10;
 /// Members farther apart than this hide nothing of each other.
-constexpr double kBeside_mm = 4;
+constexpr double kBeside_mm = 5;
 /// Below this nothing is worth a closer look.
 constexpr double kHopeless_nats = 3;
 
