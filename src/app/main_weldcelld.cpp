@@ -162,7 +162,7 @@ int serve(const files::CellConfig& config, const std::string& ports_file) {
                config.setup.name, config.egm.host, wiring->egm_port.load(), config.modbus.host,
                wiring->modbus_port.load(), config.spool_dir);
   adapters::notify_ready("waiting for a job");
-  Watchdog watchdog;
+  Watchdog watchdog(adapters::now());
   while (g_signal == 0) {
     if (g_reload != 0) {
       g_reload = 0;

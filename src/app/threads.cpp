@@ -57,13 +57,14 @@ Result<std::vector<rt::Thread>> start_threads(Wiring& wiring, CellThread& cell, 
   return threads;
 }
 
-Watchdog::Watchdog() {
+Watchdog::Watchdog(HostTime now) {
   if (const auto interval = adapters::watchdog_interval()) interval_ = *interval;
+  next_ = now + pace();
 }
 
 void Watchdog::step(Wiring& wiring, HostTime now) {
   if (now < next_) return;
-  next_ = now + (interval_ > 0 ? interval_ / 2 : kSecond);
+  next_ = now + pace();
   bool all_moved = true;
   for (std::size_t i = 0; i < kThreads; ++i) {
     const std::uint64_t beat = wiring.heartbeats[i].load(std::memory_order_relaxed);

@@ -22,10 +22,13 @@ Result<std::vector<rt::Thread>> start_threads(Wiring& wiring, CellThread& cell, 
 /// Kicks systemd's watchdog only while every thread's heartbeat moves.
 class Watchdog {
  public:
-  Watchdog();
+  /// First asks when the threads have had time for a beat.
+  explicit Watchdog(HostTime now);
   void step(Wiring& wiring, HostTime now);
 
  private:
+  Nanoseconds pace() const { return interval_ > 0 ? interval_ / 2 : kSecond; }
+
   Nanoseconds interval_ = 0;  ///< 0: no watchdog
   HostTime next_;
   std::string last_status_;

@@ -1,5 +1,5 @@
 """The daemon killed by SIGKILL at seeded random moments of simulated jobs; afterwards nothing may be lost, doubled, welded twice, or have moved
-before a person armed again. One row of `scripts/bench shop`, and a short case of ctest."""
+before a person armed again. Rows of `scripts/bench shop`; too long for ctest."""
 import argparse
 import collections
 import glob

@@ -8,6 +8,11 @@ namespace {
 
 const std::string kFolder = WELDCELL_TEST_DATA "/edges";
 
+/// Lines 40 mm apart may pass a joint of a member as wide by; of these sets two do.
+bool passes_a_joint_by(const std::string& name, const std::string& kind, int i) {
+  return name == "nearsym" && ((kind == "var1" && i == 0) || (kind == "lat8spi" && i == 1));
+}
+
 class EdgeSets : public ::testing::TestWithParam<std::tuple<const char*, const char*>> {};
 
 TEST_P(EdgeSets, PoseIsFoundWithinAMillimetreAndAFifthOfADegree) {
@@ -39,10 +44,9 @@ TEST_P(EdgeSets, PoseIsFoundWithinAMillimetreAndAFifthOfADegree) {
     if (std::string(kind) == "missing") {
       EXPECT_NE(found.verdict, Verdict::Weld) << name << "/" << kind << "/" << i;
       EXPECT_EQ(found.cause, "member_missing") << name << "/" << kind << "/" << i << found.reason;
-    } else if (found.cause == "not_looked_at") {
-      // Lines 40 mm apart may pass a joint of a member as wide by; of these sets two do.
-      EXPECT_TRUE(std::string(kind) == "lat8spi" || std::string(kind) == "var1") << found.reason;
-      EXPECT_EQ(found.verdict, Verdict::Rescan);
+    } else if (passes_a_joint_by(name, kind, i)) {
+      EXPECT_EQ(found.verdict, Verdict::Rescan) << name << "/" << kind << "/" << i;
+      EXPECT_EQ(found.cause, "not_looked_at") << name << "/" << kind << "/" << i << found.reason;
       EXPECT_FALSE(found.rescan.empty());
     } else {
       EXPECT_EQ(found.verdict, Verdict::Weld)

@@ -2,23 +2,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
+#include "line_scan.hpp"
 #include "weldcell/localize/localizer.hpp"
 
 namespace weldcell::localize {
 namespace {
 
-using workpiece::Member;
 using workpiece::OutlineTemplate;
 using workpiece::Workpiece;
-
-Member box(const std::string& name, const Vec2& low, const Vec2& high) {
-  Member out;
-  out.name = out.tag = name;
-  out.outline = {low, {high.x(), low.y()}, high, {low.x(), high.y()}};
-  return out;
-}
 
 Workpiece ladder(double upper_rail_off_mm) {
   Workpiece w;
@@ -31,32 +23,16 @@ Workpiece ladder(double upper_rail_off_mm) {
   return *workpiece::validated(std::move(w));
 }
 
-struct Scan {
-  std::vector<EdgePoint> edges;
-  std::vector<PathPiece> path;
-};
-
 /// Lines 30 mm apart both ways over what lies there, 0.2 mm noise, no clutter.
 Scan scan_of(const OutlineTemplate& part, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> noise(0, 0.2);
   Scan out;
+  std::vector<PathPiece> path;
   for (double at = -585; at < 600; at += 30) {
     const double to = std::lround((at + 585) / 30) % 2 == 0 ? 600 : -600;
-    out.path.push_back({-to, at, to, at});
-    out.path.push_back({at, -to, at, to});
+    path.push_back({-to, at, to, at});
+    path.push_back({at, -to, at, to});
   }
-  for (const PathPiece& p : out.path) {
-    const Vec2 from(p.x0_mm, p.y0_mm), end(p.x1_mm, p.y1_mm), travel = (end - from).normalized();
-    for (const workpiece::VisibleEdge& e : part.edges) {
-      const double a = (from - e.line.a).dot(e.outward), b = (end - e.line.a).dot(e.outward);
-      if ((a < 0) == (b < 0)) continue;
-      const Vec2 at = from + a / (a - b) * (end - from);
-      if (distance(at, e.line) > 1e-6) continue;
-      out.edges.push_back({at.x() + noise(random), at.y() + noise(random), travel.x(), travel.y(),
-                           travel.dot(e.outward) < 0 ? 1 : -1, 0.2, 200, false});
-    }
-  }
+  scan(part, path, seed, out);
   return out;
 }
 

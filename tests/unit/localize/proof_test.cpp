@@ -4,23 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
+#include "line_scan.hpp"
 #include "weldcell/localize/localizer.hpp"
 
 namespace weldcell::localize {
 namespace {
 
-using workpiece::Member;
 using workpiece::OutlineTemplate;
 using workpiece::Workpiece;
-
-Member box(const std::string& name, const Vec2& low, const Vec2& high) {
-  Member out;
-  out.name = out.tag = name;
-  out.outline = {low, {high.x(), low.y()}, high, {low.x(), high.y()}};
-  return out;
-}
 
 /// rung_1 moved up by so much: slots at its lower joint, into the upper rail.
 Workpiece ladder(double rung_up_mm) {
@@ -31,29 +23,6 @@ Workpiece ladder(double rung_up_mm) {
                box("rung_1", {-300, -210 + rung_up_mm}, {-260, 210 + rung_up_mm}),
                box("rung_2", {40, -210}, {80, 210}), box("rung_3", {380, -210}, {420, 210})};
   return *workpiece::validated(std::move(w));
-}
-
-struct Scan {
-  std::vector<EdgePoint> edges;
-  std::vector<PathPiece> path;
-};
-
-/// What lies there along these lines, 0.2 mm noise, no clutter.
-void scan(const OutlineTemplate& part, const std::vector<PathPiece>& path, std::uint64_t seed, Scan& out) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> noise(0, 0.2);
-  for (const PathPiece& p : path) {
-    const Vec2 from(p.x0_mm, p.y0_mm), end(p.x1_mm, p.y1_mm), travel = (end - from).normalized();
-    for (const workpiece::VisibleEdge& e : part.edges) {
-      const double a = (from - e.line.a).dot(e.outward), b = (end - e.line.a).dot(e.outward);
-      if ((a < 0) == (b < 0)) continue;
-      const Vec2 at = from + a / (a - b) * (end - from);
-      if (distance(at, e.line) > 1e-6) continue;
-      out.edges.push_back({at.x() + noise(random), at.y() + noise(random), travel.x(), travel.y(),
-                           travel.dot(e.outward) < 0 ? 1 : -1, 0.2, 200, false});
-    }
-  }
-  out.path.insert(out.path.end(), path.begin(), path.end());
 }
 
 /// Lines 25 mm apart both ways, less those that would show rung_1's lower joint.
