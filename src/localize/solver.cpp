@@ -18,6 +18,9 @@ namespace {
 constexpr std::size_t kModes = 8;
 /// Beyond this a second mode need not be looked at more closely.
 constexpr double kFarBehind_nats = 40;
+/// A pose this far beyond the range may still lie in it.
+constexpr double kOnTheLimit_mm = 1;
+constexpr double kOnTheLimit_rad = rad(0.1);
 /// A millisecond that looks like so much turn at the farthest point is told apart from it by little.
 constexpr double kCoupled_mm_per_ms = 0.05;
 /// At least two points, so that no stray one alone tells which of two members is off.
@@ -83,11 +86,13 @@ class Solver {
  private:
   void collect_candidates() {
     const std::vector<Crossing> few = sampled(medium_, kSearchPoints);
-    for (const Mode& mode : search(fields_, few, box_, kModes)) {
-      if (!candidates_.empty() && mode.score < 0.5 * best_score_) break;
-      best_score_ = std::max(best_score_, mode.score);
+    const std::vector<Mode> modes = search(fields_, few, box_, kModes);
+    for (const Mode& mode : modes) {
+      if (!candidates_.empty() && mode.score < 0.5 * modes.front().score) break;
       consider(few, mode.pose, false);
     }
+    // What drifts out of the range is looked at all the same: something lies there, and has a name.
+    if (candidates_.empty() && !modes.empty()) consider(few, modes.front().pose, false, true);
     if (candidates_.empty()) return;
     order();
     add_turned(few);
@@ -95,11 +100,12 @@ class Solver {
     prefer_planned_turn();
   }
 
-  void consider(const std::vector<Crossing>& few, const CentredPose& from, bool turned) {
+  void consider(const std::vector<Crossing>& few, const CentredPose& from, bool turned,
+                bool outside_too = false) {
     Candidate candidate;
     candidate.state = polish(fields_, few, from, turned ? 6 : 12, &iterations_);
     candidate.turned = turned;
-    if (!box_.holds(candidate.state.pose, 12, rad(1.5))) return;
+    if (!outside_too && !box_.holds(candidate.state.pose, 12, rad(1.5))) return;
     for (const Candidate& other : candidates_) {
       if (same_place(fields_, other.state.pose, candidate.state.pose)) return;
     }
@@ -122,17 +128,22 @@ class Solver {
     }
   }
 
-  /// Of the images under true symmetries, which no scan can tell apart, the one least turned from planned.
+  /// Of the images under true symmetries, which no scan can tell apart, one that lies in the range, and of
+  /// these the one least turned from planned.
   void prefer_planned_turn() {
     const Pose2 best = part_pose(outline_, candidates_.front().state.pose);
     CentredPose& chosen = candidates_.front().state.pose;
-    const auto turn = [&](const CentredPose& p) {
-      return std::abs(wrap_pi(p.theta_rad - box_.planned.theta_rad));
+    const auto before = [&](const CentredPose& a, const CentredPose& b) {
+      const bool a_held = box_.holds(a, kOnTheLimit_mm, kOnTheLimit_rad),
+                 b_held = box_.holds(b, kOnTheLimit_mm, kOnTheLimit_rad);
+      if (a_held != b_held) return a_held;
+      return std::abs(wrap_pi(a.theta_rad - box_.planned.theta_rad)) <
+             std::abs(wrap_pi(b.theta_rad - box_.planned.theta_rad)) - 1e-6;
     };
     for (const workpiece::Symmetry& symmetry : outline_.symmetries) {
       if (symmetry.gap_mm != 0) continue;
       const CentredPose image = centred_pose(outline_, best * symmetry.map);
-      if (turn(image) < turn(chosen) - 1e-6) chosen = image;
+      if (before(image, chosen)) chosen = image;
     }
   }
 
@@ -295,7 +306,6 @@ class Solver {
   SearchBox box_;
   Priors priors_;
   std::vector<Crossing> medium_;  ///< at most 400, evenly
-  double best_score_ = 0;
   int iterations_ = 0;
   std::vector<Candidate> candidates_;
   Fit fit_;
