@@ -20,7 +20,10 @@ constexpr double kFarther_mm = 20;
 /// Passes that say the same: of a turn and a side, say, of one member.
 constexpr double kSamePass_mm = 15;
 
-/// Places, along its normal's left, of the points that lie on each side of each member.
+/// A point nearer to a corner may lie on either side.
+constexpr double kCorner_mm = 3;
+
+/// Places of the points that lie on each side of each member, those at its corners left out.
 class PointsOnSides {
  public:
   explicit PointsOnSides(const Situation& s) : sides_(s.outline.members.size()) {
@@ -28,8 +31,13 @@ class PointsOnSides {
     for (std::size_t i = 0; i < s.fit.matches.size(); ++i) {
       if (s.fit.matches[i].edge < 0 || s.fit.inlier[i] <= 0.5) continue;
       const workpiece::VisibleEdge& e = s.outline.edges[static_cast<std::size_t>(s.fit.matches[i].edge)];
-      sides_[static_cast<std::size_t>(e.member)][static_cast<std::size_t>(e.side)].push_back(
-          s.fit.matches[i].place + s.outline.centroid);
+      const Vec2 place = s.fit.matches[i].place + s.outline.centroid;
+      const Polygon& outline = s.outline.members[static_cast<std::size_t>(e.member)];
+      const auto side = static_cast<std::size_t>(e.side);
+      if ((place - outline[side]).norm() < kCorner_mm ||
+          (place - outline[(side + 1) % outline.size()]).norm() < kCorner_mm)
+        continue;
+      sides_[static_cast<std::size_t>(e.member)][side].push_back(place);
     }
   }
   const std::vector<Vec2>& on(int member, std::size_t side) const {

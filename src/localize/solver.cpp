@@ -18,9 +18,6 @@ namespace {
 constexpr std::size_t kModes = 8;
 /// Beyond this a second mode need not be looked at more closely.
 constexpr double kFarBehind_nats = 40;
-/// A pose this far beyond the range may still lie in it.
-constexpr double kOnTheLimit_mm = 1;
-constexpr double kOnTheLimit_rad = rad(0.1);
 /// A millisecond that looks like so much turn at the farthest point is told apart from it by little.
 constexpr double kCoupled_mm_per_ms = 0.05;
 /// At least two points, so that no stray one alone tells which of two members is off.
@@ -50,14 +47,10 @@ struct Candidate {
 /// One run of the robust method over ready crossings.
 class Solver {
  public:
-  Solver(const workpiece::OutlineTemplate& outline, const TemplateFields& fields, const Crossings& crossings,
-         std::span<const PathPiece> path, const LocalizeOptions& options)
-      : outline_(outline),
-        fields_(fields),
-        crossings_(crossings.list),
-        stray_(crossings.stray),
-        path_(path),
-        options_(options) {
+  Solver(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
+         const std::vector<Crossing>& crossings, std::span<const PathPiece> path,
+         const LocalizeOptions& options)
+      : outline_(outline), fields_(fields), crossings_(crossings), path_(path), options_(options) {
     box_ = {centred_pose(outline, options.planned), options.range_mm, std::min(options.range_rad, kPi),
             Vec2(-outline.centroid)};
     priors_.latency_ms = 1e3 * options.latency_sigma_s;
@@ -86,13 +79,11 @@ class Solver {
  private:
   void collect_candidates() {
     const std::vector<Crossing> few = sampled(medium_, kSearchPoints);
-    const std::vector<Mode> modes = search(fields_, few, box_, kModes);
-    for (const Mode& mode : modes) {
-      if (!candidates_.empty() && mode.score < 0.5 * modes.front().score) break;
+    for (const Mode& mode : search(fields_, few, box_, kModes)) {
+      if (!candidates_.empty() && mode.score < 0.5 * best_score_) break;
+      best_score_ = std::max(best_score_, mode.score);
       consider(few, mode.pose, false);
     }
-    // What drifts out of the range is looked at all the same: something lies there, and has a name.
-    if (candidates_.empty() && !modes.empty()) consider(few, modes.front().pose, false, true);
     if (candidates_.empty()) return;
     order();
     add_turned(few);
@@ -100,12 +91,11 @@ class Solver {
     prefer_planned_turn();
   }
 
-  void consider(const std::vector<Crossing>& few, const CentredPose& from, bool turned,
-                bool outside_too = false) {
+  void consider(const std::vector<Crossing>& few, const CentredPose& from, bool turned) {
     Candidate candidate;
     candidate.state = polish(fields_, few, from, turned ? 6 : 12, &iterations_);
     candidate.turned = turned;
-    if (!outside_too && !box_.holds(candidate.state.pose, 12, rad(1.5))) return;
+    if (!box_.holds(candidate.state.pose, 12, rad(1.5))) return;
     for (const Candidate& other : candidates_) {
       if (same_place(fields_, other.state.pose, candidate.state.pose)) return;
     }
@@ -128,22 +118,17 @@ class Solver {
     }
   }
 
-  /// Of the images under true symmetries, which no scan can tell apart, one that lies in the range, and of
-  /// these the one least turned from planned.
+  /// Of the images under true symmetries, which no scan can tell apart, the one least turned from planned.
   void prefer_planned_turn() {
     const Pose2 best = part_pose(outline_, candidates_.front().state.pose);
     CentredPose& chosen = candidates_.front().state.pose;
-    const auto before = [&](const CentredPose& a, const CentredPose& b) {
-      const bool a_held = box_.holds(a, kOnTheLimit_mm, kOnTheLimit_rad),
-                 b_held = box_.holds(b, kOnTheLimit_mm, kOnTheLimit_rad);
-      if (a_held != b_held) return a_held;
-      return std::abs(wrap_pi(a.theta_rad - box_.planned.theta_rad)) <
-             std::abs(wrap_pi(b.theta_rad - box_.planned.theta_rad)) - 1e-6;
+    const auto turn = [&](const CentredPose& p) {
+      return std::abs(wrap_pi(p.theta_rad - box_.planned.theta_rad));
     };
     for (const workpiece::Symmetry& symmetry : outline_.symmetries) {
       if (symmetry.gap_mm != 0) continue;
       const CentredPose image = centred_pose(outline_, best * symmetry.map);
-      if (before(image, chosen)) chosen = image;
+      if (turn(image) < turn(chosen) - 1e-6) chosen = image;
     }
   }
 
@@ -266,7 +251,7 @@ class Solver {
     const double c = std::cos(result.pose.theta_rad), s = std::sin(result.pose.theta_rad);
     for (std::size_t i = 0; i < edges.size(); ++i) {
       const Crossings one = ready_crossings(edges.subspan(i, 1), options_.default_sigma_mm);
-      if (one.list.empty() || (!stray_.empty() && stray_[i])) continue;
+      if (one.list.empty()) continue;
       const Match m = match(fields_, one.list.front(), fit_.state.pose, c, s);
       if (m.edge < 0) continue;
       result.residual_mm[i] = m.residual_mm;
@@ -300,12 +285,12 @@ class Solver {
   const workpiece::OutlineTemplate& outline_;
   const TemplateFields& fields_;
   const std::vector<Crossing>& crossings_;
-  const std::vector<bool>& stray_;
   std::span<const PathPiece> path_;
   const LocalizeOptions& options_;
   SearchBox box_;
   Priors priors_;
   std::vector<Crossing> medium_;  ///< at most 400, evenly
+  double best_score_ = 0;
   int iterations_ = 0;
   std::vector<Candidate> candidates_;
   Fit fit_;
@@ -316,7 +301,7 @@ class Solver {
 }  // namespace
 
 bool solve_robust(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
-                  const Crossings& crossings, std::span<const EdgePoint> edges,
+                  const std::vector<Crossing>& crossings, std::span<const EdgePoint> edges,
                   std::span<const PathPiece> path, const LocalizeOptions& options, Localization& result) {
   return Solver(outline, fields, crossings, path, options).run(edges, result);
 }

@@ -137,29 +137,47 @@ struct Planned {
   std::vector<Segment> low_ends, high_ends;  ///< passes over the members' ends, at either end of the strip
 };
 
-/// Departures of an end that its pass is laid for: by the second where the first stays under another member.
-constexpr double kEndDepartures_mm[] = {10, 20};
-
-/// Passes that show where the member's ends are: along the member, over the end or over the joint that hides
-/// it, where an end too far back would leave a slot.
-void add_end_passes(const workpiece::OutlineTemplate& outline, std::size_t member, Planned& planned) {
-  const std::vector<Polygon>& members = outline.members;
-  const Vec2 middle = centroid(members[member]);
-  std::vector<int> sides;
-  for (const double by_mm : kEndDepartures_mm) {
-    for (const workpiece::Departure& d : workpiece::departures(members, outline.edges, member, by_mm, true)) {
-      if (!d.end || std::find(sides.begin(), sides.end(), d.side) != sides.end()) continue;
-      const std::optional<Segment> pass = workpiece::telling_pass(members, d);
-      if (!pass) continue;
-      sides.push_back(d.side);
-      const bool high = ((pass->a + pass->b) / 2 - middle).dot(planned.strip.along) > 0;
-      (high ? planned.high_ends : planned.low_ends).push_back(*pass);
-    }
-  }
-}
+/// Departures that the passes must show: the second ones where the first stay under another member.
+constexpr double kDepartures_mm[] = {10, 20};
+/// A part is laid down this close to the projected outline, in x and in y, or it was found.
+constexpr double kLaidWithin_mm = 8;
 
 Vec2 axis_point(const Planned& p, double position) {
   return position * p.strip.along + p.strip.centre * p.strip.across;
+}
+
+std::vector<Segment> zigzag_lines(const std::vector<Planned>& all, double span_mm) {
+  std::vector<Segment> out;
+  for (const Planned& planned : all) {
+    const Vec2 half = span_mm / 2 * planned.strip.across;
+    for (const double position : planned.positions) {
+      const Vec2 centre = axis_point(planned, position);
+      out.push_back({centre - half, centre + half});
+    }
+  }
+  return out;
+}
+
+/// Passes that show where the member's ends are: along the member, over the end or over the joint that hides
+/// it, where an end too far back would leave a slot. What else the passes laid so far would not show gets a
+/// pass of its own. `laid` grows by them.
+void add_end_passes(const workpiece::OutlineTemplate& outline, std::size_t member, std::vector<Segment>& laid,
+                    Planned& planned) {
+  const std::vector<Polygon>& members = outline.members;
+  const Vec2 middle = centroid(members[member]);
+  for (const bool ends : {true, false}) {
+    for (const double by_mm : kDepartures_mm) {
+      for (const workpiece::Departure& d :
+           workpiece::departures(members, outline.edges, member, by_mm, true)) {
+        if (d.end != ends) continue;
+        for (const Segment& pass : workpiece::settling_passes(members, d, laid, kLaidWithin_mm)) {
+          laid.push_back(pass);
+          const bool high = ((pass.a + pass.b) / 2 - middle).dot(planned.strip.along) > 0;
+          (high ? planned.high_ends : planned.low_ends).push_back(pass);
+        }
+      }
+    }
+  }
 }
 
 /// Each pass from the side where the beam already is; the receiver looks along the edges that it crosses.
@@ -206,13 +224,16 @@ std::vector<BeamPath> zigzag_paths(const workpiece::Workpiece& workpiece, const 
   const Result<workpiece::OutlineTemplate> outline = workpiece::build_template(workpiece);
   if (!outline) return {};
   std::vector<Planned> open;
+  std::vector<std::size_t> member_of;
   for (std::size_t m = 0; m < workpiece.members.size(); ++m) {
     Strip strip = strip_of(*outline, m);
     if (strip.free.empty()) continue;
     std::vector<double> positions = positions_of(strip, inspection);
     open.push_back({std::move(strip), std::move(positions), {}, {}});
-    add_end_passes(*outline, m, open.back());
+    member_of.push_back(m);
   }
+  std::vector<Segment> laid = zigzag_lines(open, inspection.span_mm);
+  for (std::size_t i = 0; i < open.size(); ++i) add_end_passes(*outline, member_of[i], laid, open[i]);
   std::vector<BeamPath> out;
   bool first = true;
   Vec2 at = Vec2::Zero();

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 namespace weldcell::workpiece {
 
@@ -19,6 +21,15 @@ constexpr double kClear_mm = 10;
 /// Members this much longer than wide have a direction.
 constexpr double kSlender = 2;
 constexpr int kMustTell = 2;
+/// Slots narrower than this hide both sides: members are a little off.
+constexpr double kClosed_mm = 2;
+/// Places along a side that a pass across it may take.
+constexpr int kPlaces = 19;
+/// Where the part may lie is tried at so many places each way, and a pass added for no fewer than kWorthIt of
+/// them.
+constexpr int kTried = 7;
+constexpr int kWorthIt = 3;
+constexpr std::size_t kMostPasses = 3;
 
 struct Side {
   Vec2 a, b, d, n;
@@ -99,7 +110,8 @@ struct Met {
   Vec2 outward;
 };
 
-std::vector<Met> met_by(const Segment& pass, std::span<const VisibleEdge> edges) {
+/// Crossings with the edges, each less its margin at both ends.
+std::vector<Met> met_by(const Segment& pass, std::span<const VisibleEdge> edges, double margin_mm) {
   std::vector<Met> out;
   const double length = pass.length();
   for (const VisibleEdge& edge : edges) {
@@ -108,7 +120,7 @@ std::vector<Met> met_by(const Segment& pass, std::span<const VisibleEdge> edges)
     if ((from < 0) == (to < 0) || std::abs(to - from) < kMinAcross * length) continue;
     const double share = from / (from - to);
     const double along = (pass.a + share * (pass.b - pass.a) - edge.line.a).dot(edge.line.direction());
-    if (along < kEndMargin_mm || along > edge.line.length() - kEndMargin_mm) continue;
+    if (along < margin_mm || along > edge.line.length() - margin_mm) continue;
     out.push_back({share * length, edge.outward});
   }
   return out;
@@ -127,7 +139,7 @@ std::vector<VisibleEdge> edges_near(std::span<const Polygon> members, const Box2
     if (members[m].empty()) continue;
     const Box2 own = bounds(members[m]);
     if ((own.min.array() > box.max.array()).any() || (box.min.array() > own.max.array()).any()) continue;
-    for (const VisibleEdge& edge : visible_edges(members, m)) out.push_back(edge);
+    for (const VisibleEdge& edge : visible_edges(members, m, kClosed_mm)) out.push_back(edge);
   }
   return out;
 }
@@ -145,6 +157,119 @@ Segment with_clear_ends(Segment pass, std::span<const VisibleEdge> edges) {
   for (int i = 0; i < kSteps && near_edge(pass.a, edges); ++i) pass.a -= 4 * d;
   for (int i = 0; i < kSteps && near_edge(pass.b, edges); ++i) pass.b += 4 * d;
   return pass;
+}
+
+/// The part around a departure, drawn both ways, and the passes that may tell.
+struct Views {
+  std::vector<VisibleEdge> drawn, instead;
+  Box2 near;
+  std::vector<Segment> passes;
+};
+
+/// Square across the side, from one corner to the other.
+std::vector<Segment> passes_across(const Polygon& outline, const Departure& departure) {
+  const auto k = static_cast<std::size_t>(departure.side);
+  const Side side = side_of(outline, k), moved = side_of(departure.instead, k);
+  // The same both ways, so that one pass settles longer and shorter.
+  const double room = std::abs((moved.a - side.a).dot(side.n)) + kRunUp_mm;
+  std::vector<Segment> out;
+  for (int i = 1; i <= kPlaces; ++i) {
+    const Vec2 at = side.a + static_cast<double>(i) / (kPlaces + 1) * side.length * side.d;
+    out.push_back({at - room * side.n, at + room * side.n});
+  }
+  return out;
+}
+
+/// Across both sides of the end that swings, best first.
+std::vector<Segment> passes_near_end(const Polygon& outline, const Departure& departure) {
+  const Vec2 along = departure.outward, across(-along.y(), along.x());
+  const Extent length = extent(outline, along), width = extent(outline, across);
+  std::vector<Segment> out;
+  for (const double share : {0.85, 0.75, 0.65, 0.95}) {
+    const Vec2 at = (length.low + share * length.size()) * along;
+    out.push_back({at + (width.low - kRunUp_mm - kClear_mm) * across,
+                   at + (width.high + kRunUp_mm + kClear_mm) * across});
+  }
+  return out;
+}
+
+Views views_of(std::span<const Polygon> members, const Departure& departure) {
+  const auto m = static_cast<std::size_t>(departure.member);
+  Views out;
+  out.near = departure.reach;
+  out.near.min.array() -= 5 * kRunUp_mm;
+  out.near.max.array() += 5 * kRunUp_mm;
+  std::vector<Polygon> other(members.begin(), members.end());
+  out.drawn = edges_near(other, out.near);
+  other[m] = departure.instead;
+  out.instead = edges_near(other, out.near);
+  out.passes =
+      departure.side >= 0 ? passes_across(members[m], departure) : passes_near_end(members[m], departure);
+  return out;
+}
+
+/// Of passes in order along a side the middle one of the longest row that tells, so that the part may lie a
+/// little aside.
+std::optional<std::size_t> middle_of_those_that_tell(const Views& views) {
+  std::optional<std::size_t> best;
+  std::size_t longest = 0, row = 0;
+  for (std::size_t i = 0; i < views.passes.size(); ++i) {
+    row = crossings_that_tell(views.drawn, views.instead, views.passes[i]) >= kMustTell ? row + 1 : 0;
+    if (row <= longest) continue;
+    longest = row;
+    best = i - row / 2;
+  }
+  return best;
+}
+
+std::optional<std::size_t> best_pass(const Views& views, const Departure& departure) {
+  if (departure.side >= 0) return middle_of_those_that_tell(views);
+  for (std::size_t i = 0; i < views.passes.size(); ++i) {
+    if (crossings_that_tell(views.drawn, views.instead, views.passes[i]) >= kMustTell) return i;
+  }
+  return std::nullopt;
+}
+
+/// Where the part may lie, a bit for each place that is tried.
+using Places = std::uint64_t;
+constexpr Places kEverywhere = (Places{1} << (kTried * kTried)) - 1;
+
+/// Where the passes tell, all together.
+Places told_by(const Views& views, std::span<const Segment> passes, double off_mm) {
+  std::array<int, kTried * kTried> told{};
+  for (const Segment& pass : passes) {
+    const Box2 own = bounds({pass.a, pass.b});
+    if ((own.min.array() > views.near.max.array()).any() || (views.near.min.array() > own.max.array()).any())
+      continue;
+    for (int i = 0; i < kTried * kTried; ++i) {
+      const Vec2 by = off_mm * (2.0 / (kTried - 1) * Vec2(i % kTried, i / kTried) - Vec2(1, 1));
+      told[static_cast<std::size_t>(i)] +=
+          crossings_that_tell(views.drawn, views.instead, {pass.a + by, pass.b + by});
+    }
+  }
+  Places out = 0;
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    if (told[i] >= kMustTell) out |= Places{1} << i;
+  }
+  return out;
+}
+
+/// The `count` of the masks that tell in most places beside `told`, the first of equal ones.
+std::vector<std::size_t> best_together(const std::vector<Places>& masks, Places told, std::size_t count,
+                                       std::size_t from = 0) {
+  std::vector<std::size_t> best;
+  int most = -1;
+  for (std::size_t i = from; i < masks.size(); ++i) {
+    std::vector<std::size_t> chosen;
+    if (count > 1) chosen = best_together(masks, told | masks[i], count - 1, i + 1);
+    chosen.push_back(i);
+    Places all = told;
+    for (const std::size_t k : chosen) all |= masks[k];
+    if (chosen.size() < count || std::popcount(all) <= most) continue;
+    most = std::popcount(all);
+    best = std::move(chosen);
+  }
+  return best;
 }
 
 }  // namespace
@@ -189,47 +314,52 @@ std::vector<Departure> departures(std::span<const Polygon> members, std::span<co
 
 int crossings_that_tell(std::span<const VisibleEdge> drawn, std::span<const VisibleEdge> instead,
                         const Segment& pass) {
-  const std::vector<Met> here = met_by(pass, drawn), there = met_by(pass, instead);
-  const auto only_in = [](const std::vector<Met>& a, const std::vector<Met>& b) {
-    return static_cast<int>(std::count_if(a.begin(), a.end(), [&](const Met& m) { return !among(m, b); }));
+  // What one has for sure and the other not even near the end of an edge.
+  const auto only_in = [&](std::span<const VisibleEdge> one, std::span<const VisibleEdge> other) {
+    const std::vector<Met> sure = met_by(pass, one, kEndMargin_mm),
+                           maybe = met_by(pass, other, -kEndMargin_mm);
+    return static_cast<int>(
+        std::count_if(sure.begin(), sure.end(), [&](const Met& m) { return !among(m, maybe); }));
   };
-  return only_in(here, there) + only_in(there, here);
+  return only_in(drawn, instead) + only_in(instead, drawn);
 }
 
 std::optional<Segment> telling_pass(std::span<const Polygon> members, const Departure& departure) {
-  const auto m = static_cast<std::size_t>(departure.member);
-  Box2 near = departure.reach;
-  near.min.array() -= 5 * kRunUp_mm;
-  near.max.array() += 5 * kRunUp_mm;
-  std::vector<Polygon> other(members.begin(), members.end());
-  const std::vector<VisibleEdge> drawn = edges_near(other, near);
-  other[m] = departure.instead;
-  const std::vector<VisibleEdge> instead = edges_near(other, near);
+  const Views views = views_of(members, departure);
+  const std::optional<std::size_t> best = best_pass(views, departure);
+  if (!best) return std::nullopt;
+  return with_clear_ends(views.passes[*best], views.drawn);
+}
 
-  const Polygon& outline = members[m];
-  std::vector<Segment> passes;
-  if (departure.side >= 0) {
-    const auto k = static_cast<std::size_t>(departure.side);
-    const Side side = side_of(outline, k), moved = side_of(departure.instead, k);
-    // The same both ways, so that one pass settles longer and shorter.
-    const double room = std::abs((moved.a - side.a).dot(side.n)) + kRunUp_mm;
-    for (const double share : {0.5, 0.35, 0.65, 0.2, 0.8, 0.1, 0.9}) {
-      const Vec2 at = side.a + share * side.length * side.d;
-      passes.push_back({at - room * side.n, at + room * side.n});
-    }
-  } else {
-    const Vec2 along = departure.outward, across(-along.y(), along.x());
-    const Extent length = extent(outline, along), width = extent(outline, across);
-    for (const double share : {0.85, 0.75, 0.65, 0.95}) {
-      const Vec2 at = (length.low + share * length.size()) * along;
-      passes.push_back({at + (width.low - kRunUp_mm - kClear_mm) * across,
-                        at + (width.high + kRunUp_mm + kClear_mm) * across});
-    }
-  }
+std::vector<Segment> settling_passes(std::span<const Polygon> members, const Departure& departure,
+                                     std::span<const Segment> laid, double off_mm) {
+  std::vector<Segment> out;
+  const Views views = views_of(members, departure);
+  const std::optional<std::size_t> best = best_pass(views, departure);
+  if (!best) return out;
+  const Places told = told_by(views, laid, off_mm);
+  if (told == kEverywhere) return out;
+  // Nearest to the best one first, which wins where several settle as much.
+  std::vector<Segment> passes = views.passes;
+  std::stable_sort(passes.begin(), passes.end(), [&](const Segment& a, const Segment& b) {
+    return (a.a - views.passes[*best].a).norm() < (b.a - views.passes[*best].a).norm();
+  });
+  std::vector<Places> masks;
   for (const Segment& pass : passes) {
-    if (crossings_that_tell(drawn, instead, pass) >= kMustTell) return with_clear_ends(pass, drawn);
+    masks.push_back(told_by(views, {&pass, 1}, off_mm));
+    if ((masks.back() | told) == kEverywhere) break;
   }
-  return std::nullopt;
+  int settled = std::popcount(told);
+  for (std::size_t count = 1; count <= kMostPasses && settled < std::popcount(kEverywhere); ++count) {
+    Places with = told;
+    const std::vector<std::size_t> chosen = best_together(masks, told, count);
+    for (const std::size_t k : chosen) with |= masks[k];
+    if (std::popcount(with) < settled + kWorthIt) break;
+    settled = std::popcount(with);
+    out.clear();
+    for (const std::size_t k : chosen) out.push_back(with_clear_ends(passes[k], views.drawn));
+  }
+  return out;
 }
 
 }  // namespace weldcell::workpiece

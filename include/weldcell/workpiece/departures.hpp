@@ -38,9 +38,16 @@ bool is_end(const Polygon& outline, std::size_t side);
 int crossings_that_tell(std::span<const VisibleEdge> drawn, std::span<const VisibleEdge> instead,
                         const Segment& pass);
 
-/// The shortest pass, frame Part, that tells the departure from the drawing by at least two crossings: square
-/// across the side, or across both sides of the end that swings, with room before the first edge and behind
-/// the last. Nothing when from above both are one part, as where an end grows into a joint.
+/// The pass, frame Part, that tells the departure from the drawing by at least two crossings: square across
+/// the side, where there is most room to both sides, or across both sides of the end that swings, with room
+/// before the first edge and behind the last. Nothing when from above both are one part, as where an end
+/// grows into a joint or leaves a slot of less than 2 mm.
 std::optional<Segment> telling_pass(std::span<const Polygon> members, const Departure& departure);
+
+/// The fewest passes of that kind, three at most, that beside the passes already laid tell the departure from
+/// the drawing wherever the part lies within off_mm, in x and in y, of where it is expected. None when those
+/// laid do, or when nobody can tell.
+std::vector<Segment> settling_passes(std::span<const Polygon> members, const Departure& departure,
+                                     std::span<const Segment> laid, double off_mm);
 
 }  // namespace weldcell::workpiece

@@ -101,36 +101,52 @@ TEST(Zigzag, IsCentredOnTheAxisAndSpreadAlongIt) {
     EXPECT_NEAR(along[i] - along[i - 1], 1060 / 3.0, 80) << "moved farther than a joint needs";
 }
 
-/// Whether the pass meets a place other than at its ends, mm aside at most.
-bool runs_over(const BeamPath& path, const Vec2& place) {
-  const Segment line{path.points[0], path.points[1]};
-  return distance(place, line) < 0.5 && (place - line.a).norm() > 20 && (place - line.b).norm() > 20;
+/// A cross bar whose ends lie inside slanting legs, so that one end too short by 20 mm leaves but a wedge.
+workpiece::Workpiece a_frame() {
+  workpiece::Workpiece w;
+  w.name = "a_frame";
+  w.height_mm = 40;
+  const auto bar = [&](const char* name, const Vec2& from, const Vec2& to, double width_mm) {
+    const Vec2 d = (to - from).normalized(), n = width_mm / 2 * Vec2(-d.y(), d.x());
+    workpiece::Member m;
+    m.name = m.tag = name;
+    m.outline = {from - n, to - n, to + n, from + n};
+    w.members.push_back(m);
+  };
+  bar("foot", {-400, -260}, {400, -260}, 60);
+  bar("left", {-330, -230}, {-30, 300}, 50);
+  bar("right", {330, -230}, {30, 300}, 50);
+  bar("cross", {-190, 0}, {190, 0}, 40);
+  return *workpiece::validated(std::move(w));
 }
 
-TEST(Zigzag, RunsOverTheMiddleOfEveryEndWhetherOpenOrInAJoint) {
-  for (const Case& c : cases()) {
+TEST(Zigzag, ShowsEveryDepartureWhereverThePartLiesWithinEightMillimetres) {
+  std::vector<Case> all = cases();
+  all.push_back({"a_frame", a_frame(), {}});
+  for (const Case& c : all) {
     SCOPED_TRACE(c.name);
-    std::map<std::string, int> ends;
-    const std::vector<BeamPath> paths = beam_paths(c.workpiece, c.pose, {}, Pattern::Zigzag);
-    for (const BeamPath& path : paths) {
-      if (!over_an_end(path)) continue;
+    const auto outline = workpiece::build_template(c.workpiece);
+    ASSERT_TRUE(outline.ok());
+    std::vector<Segment> laid, across;
+    for (const BeamPath& path : beam_paths(c.workpiece, {}, {}, Pattern::Zigzag)) {
       ASSERT_EQ(path.points.size(), 2u);
-      ++ends[member_of(path)];
+      laid.push_back({path.points[0], path.points[1]});
+      if (!over_an_end(path)) across.push_back(laid.back());
     }
-    for (const workpiece::Member& member : c.workpiece.members) {
-      SCOPED_TRACE(member.name);
-      EXPECT_EQ(ends[member.name], 2);
-      for (std::size_t k = 0; k < member.outline.size(); ++k) {
-        if (!workpiece::is_end(member.outline, k)) continue;
-        const Vec2 middle = (member.outline[k] + member.outline[(k + 1) % member.outline.size()]) / 2;
-        EXPECT_TRUE(std::any_of(paths.begin(), paths.end(),
-                                [&](const BeamPath& path) {
-                                  return over_an_end(path) && member_of(path) == member.name &&
-                                         runs_over(path, c.pose * middle);
-                                }))
-            << "end " << k;
+    int asked = 0, more = 0;
+    for (std::size_t m = 0; m < outline->members.size(); ++m) {
+      for (const double by_mm : {10.0, 20.0}) {
+        for (const workpiece::Departure& d :
+             workpiece::departures(outline->members, outline->edges, m, by_mm, true)) {
+          ++asked;
+          more += !workpiece::settling_passes(outline->members, d, across, 8).empty();
+          EXPECT_TRUE(workpiece::settling_passes(outline->members, d, laid, 8).empty())
+              << outline->member_names[m] << " side " << d.side << " by " << by_mm;
+        }
       }
     }
+    EXPECT_GT(asked, 20);
+    EXPECT_GT(more, 4) << "the passes across the members do not show their ends";
   }
 }
 

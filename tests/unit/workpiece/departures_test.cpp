@@ -127,7 +127,37 @@ TEST(Departures, CrossingsThatTell) {
   EXPECT_EQ(tell({320, 20}, {320, 100}), 2) << "both sides of the slot";
   EXPECT_EQ(tell({280, 45}, {360, 45}), 2) << "the post is not there any more";
   EXPECT_EQ(tell({280, 60}, {360, 60}), 0) << "the post is there either way";
-  EXPECT_EQ(tell({301, 20}, {301, 100}), 1) << "the rail alone: too near to the corner of the post";
+  EXPECT_EQ(tell({301, 20}, {301, 100}), 0) << "too near to the corner of the post";
+}
+
+TEST(Departures, APassTakesTheMiddleOfWhereItTells) {
+  // Over a slanting side, 20 mm back: a slot that is open over x = 300 and closed from x = 318 on.
+  Workpiece w = frame();
+  w.members[kLow].outline = {{260, 0}, {800, 0}, {800, 540}};
+  const auto part = build_template(*validated(std::move(w)));
+  ASSERT_TRUE(part.ok());
+  const std::vector<Departure> all = departures(part->members, part->edges, kPost, 20, true);
+  const Departure* back = find(all, {0, -1}, -20, part->members[kPost]);
+  ASSERT_NE(back, nullptr);
+  const auto pass = telling_pass(part->members, *back);
+  ASSERT_TRUE(pass.has_value());
+  EXPECT_GT(pass->a.x(), 304);
+  EXPECT_LT(pass->a.x(), 314);
+}
+
+TEST(Departures, PassesThatSettleWhereverThePartLies) {
+  const auto part = build_template(frame());
+  ASSERT_TRUE(part.ok());
+  const std::vector<Departure> all = of(*part, kPost, true);
+  const Departure* back = find(all, {0, -1}, -10, part->members[kPost]);
+  ASSERT_NE(back, nullptr);
+  const std::vector<Segment> near = settling_passes(part->members, *back, {}, 8),
+                             far = settling_passes(part->members, *back, {}, 30);
+  ASSERT_EQ(near.size(), 1u) << "the post is 40 wide";
+  EXPECT_GT(far.size(), 1u);
+  EXPECT_TRUE(settling_passes(part->members, *back, near, 8).empty()) << "they are laid already";
+  const auto elsewhere = settling_passes(part->members, *back, far, 8);
+  EXPECT_LE(elsewhere.size(), 1u);
 }
 
 }  // namespace
