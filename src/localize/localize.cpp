@@ -45,7 +45,7 @@ Localizer& Localizer::operator=(Localizer&&) noexcept = default;
 std::size_t Localizer::memory_bytes() const { return fields_->memory_bytes(); }
 
 Localization Localizer::localize(std::span<const EdgePoint> edges, std::span<const PathPiece> path,
-                                 const LocalizeOptions& options) const {
+                                 const LocalizeOptions& options, const StageDone& done) const {
   if (const std::string wrong = wrong_option(options); !wrong.empty()) {
     return refused(Verdict::Reject, "bad_options", "The option " + wrong + ". Correct the job.",
                    edges.size());
@@ -90,7 +90,7 @@ Localization Localizer::localize(std::span<const EdgePoint> edges, std::span<con
     return paper::localize(*outline_, crossings.list, edges.size(), options);
   }
   Localization result;
-  if (!solve_robust(*outline_, *fields_, crossings.list, edges, path, options, result)) {
+  if (!solve_robust(*outline_, *fields_, crossings.list, edges, path, options, done, result)) {
     return refused(
         Verdict::Reject, "no_fit",
         "No place within the allowed range fits the edge points. Check that the right part lies there.",

@@ -49,8 +49,13 @@ class Solver {
  public:
   Solver(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
          const std::vector<Crossing>& crossings, std::span<const PathPiece> path,
-         const LocalizeOptions& options)
-      : outline_(outline), fields_(fields), crossings_(crossings), path_(path), options_(options) {
+         const LocalizeOptions& options, const StageDone& done)
+      : outline_(outline),
+        fields_(fields),
+        crossings_(crossings),
+        path_(path),
+        options_(options),
+        done_(done) {
     box_ = {centred_pose(outline, options.planned), options.range_mm, std::min(options.range_rad, kPi),
             Vec2(-outline.centroid)};
     priors_.latency_ms = 1e3 * options.latency_sigma_s;
@@ -63,23 +68,33 @@ class Solver {
   bool run(std::span<const EdgePoint> edges, Localization& result) {
     medium_ = sampled(crossings_, 400);
     collect_candidates();
+    end(Stage::Polish);
     if (candidates_.empty()) return false;
     fit_ = refine(fields_, crossings_,
                   polish(fields_, medium_, candidates_.front().state.pose, 4, &iterations_), priors_);
     try_other_latencies();
+    end(Stage::Refine);
     evidence_ = gather_evidence(fields_, path_, fit_);
     weigh_rivals();
+    end(Stage::Rivals);
     tell_member_off();
     fill(result);
     fill_points(edges, result);
     decide({outline_, fields_, options_, crossings_, path_, fit_, evidence_, rivals_}, result);
+    end(Stage::Verdict);
     return true;
   }
 
  private:
+  void end(Stage stage) const {
+    if (done_) done_(stage);
+  }
+
   void collect_candidates() {
     const std::vector<Crossing> few = sampled(medium_, kSearchPoints);
-    for (const Mode& mode : search(fields_, few, box_, kModes)) {
+    const std::vector<Mode> modes = search(fields_, few, box_, kModes);
+    end(Stage::Search);
+    for (const Mode& mode : modes) {
       if (!candidates_.empty() && mode.score < 0.5 * best_score_) break;
       best_score_ = std::max(best_score_, mode.score);
       consider(few, mode.pose, false);
@@ -287,6 +302,7 @@ class Solver {
   const std::vector<Crossing>& crossings_;
   std::span<const PathPiece> path_;
   const LocalizeOptions& options_;
+  const StageDone& done_;
   SearchBox box_;
   Priors priors_;
   std::vector<Crossing> medium_;  ///< at most 400, evenly
@@ -302,8 +318,9 @@ class Solver {
 
 bool solve_robust(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
                   const std::vector<Crossing>& crossings, std::span<const EdgePoint> edges,
-                  std::span<const PathPiece> path, const LocalizeOptions& options, Localization& result) {
-  return Solver(outline, fields, crossings, path, options).run(edges, result);
+                  std::span<const PathPiece> path, const LocalizeOptions& options, const StageDone& done,
+                  Localization& result) {
+  return Solver(outline, fields, crossings, path, options, done).run(edges, result);
 }
 
 }  // namespace weldcell::localize

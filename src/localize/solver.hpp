@@ -6,7 +6,7 @@
 
 #include "crossings.hpp"
 #include "fields.hpp"
-#include "weldcell/localize/localize.hpp"
+#include "weldcell/localize/localizer.hpp"
 
 namespace weldcell::localize {
 
@@ -14,6 +14,7 @@ namespace weldcell::localize {
 /// False when no pose of the range brings a single point near an edge.
 bool solve_robust(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
                   const std::vector<Crossing>& crossings, std::span<const EdgePoint> edges,
-                  std::span<const PathPiece> path, const LocalizeOptions& options, Localization& result);
+                  std::span<const PathPiece> path, const LocalizeOptions& options, const StageDone& done,
+                  Localization& result);
 
 }  // namespace weldcell::localize

@@ -2,6 +2,8 @@
 // Pure.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -10,6 +12,12 @@
 namespace weldcell::localize {
 
 class TemplateFields;
+
+/// What the robust method does one after the other: modes found, polished and ordered, the best one refined,
+/// the others weighed against it, the verdict reached.
+enum class Stage : std::uint8_t { Search, Polish, Refine, Rivals, Verdict };
+/// Called at the end of each stage that was reached, in the caller's thread; for a caller who measures.
+using StageDone = std::function<void(Stage)>;
 
 /// Holds what does not depend on the scan (a few MB, built in milliseconds). localize() is const,
 /// deterministic and safe to call from several threads at once. At the same number of points 32 members take
@@ -26,7 +34,7 @@ class Localizer {
 
   /// As the free function localize(), without building the fields anew.
   Localization localize(std::span<const EdgePoint> edges, std::span<const PathPiece> path,
-                        const LocalizeOptions& options) const;
+                        const LocalizeOptions& options, const StageDone& done = {}) const;
 
  private:
   std::unique_ptr<workpiece::OutlineTemplate> outline_;

@@ -1,4 +1,6 @@
 // Time against points, members and threads, and against the paper's method.
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <thread>
@@ -17,6 +19,31 @@ Setting wide_setting(double pitch_mm) {
   return wide;
 }
 
+/// Median time of each stage and of the whole over sets of about so many points, ms.
+void stages(Book& book, const std::string& name, const PartUnderTest& part, const Setting& setting,
+            int trials) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::array<const char*, 5> kNames{"search", "polish", "refine", "rivals", "verdict"};
+  std::array<std::vector<double>, kNames.size()> spent;
+  const localize::LocalizeOptions options = options_for(setting);
+  for (int i = 0; i < trials; ++i) {
+    const EdgeSet set = make_set(part.outline(), setting, book.options.seed + static_cast<std::uint64_t>(i));
+    Clock::time_point last = Clock::now();
+    part.localizer.localize(set.edges, set.path, options, [&](localize::Stage stage) {
+      const Clock::time_point now = Clock::now();
+      spent[static_cast<std::size_t>(stage)].push_back(
+          std::chrono::duration<double, std::milli>(now - last).count());
+      last = now;
+    });
+  }
+  for (std::size_t k = 0; k < kNames.size(); ++k) {
+    if (spent[k].empty()) continue;
+    const auto middle = spent[k].begin() + static_cast<std::ptrdiff_t>(spent[k].size() / 2);
+    std::nth_element(spent[k].begin(), middle, spent[k].end());
+    book.add(name + " median of " + kNames[k], *middle, "ms", NAN, NAN, Better::None);
+  }
+}
+
 /// From about 50 to 5000 points on the ladder.
 void growth_with_points(Book& book) {
   const PartUnderTest& ladder = book.known.front();
@@ -30,6 +57,7 @@ void growth_with_points(Book& book) {
     book.add(name + " min", t.milliseconds(0), "ms", NAN, NAN, Better::None);
     book.add(name + " median", t.milliseconds(0.5), "ms", NAN, target);
     book.add(name + " p99", t.milliseconds(0.99), "ms", NAN, NAN, Better::None);
+    stages(book, name, ladder, wide, std::min(book.options.trials, 50));
   }
 }
 
@@ -116,12 +144,17 @@ void growth_with_members(Book& book) {
     const std::string name = "time " + std::to_string(part.workpiece.members.size()) + " members";
     book.add(name + " median", t.milliseconds(0.5), "ms", NAN, NAN, Better::None);
     book.add(name + " p99", t.milliseconds(0.99), "ms", NAN, NAN, Better::None);
+    if (part.workpiece.members.size() == 100)
+      book.add(name + " success", t.share(t.success), "%", NAN, 99.5, Better::Higher,
+               t.share_error(t.success));
+    book.explain(name, t);
     book.add(name + " median a point", 1e3 * t.milliseconds(0.5) / static_cast<double>(points), "us", NAN,
              NAN, Better::None);
     s.pitch_mm = pitch_for(part, kSamePoints, book.options.seed);
     same = run_cell(part, s, trials, book.options.seed, solver_of(part, s)).milliseconds(0.5);
     if (fewest_members == 0) fewest_members = same;
     book.add(name + " median at 800 points", same, "ms", NAN, NAN, Better::None);
+    stages(book, name + ", 800 points,", part, s, trials);
     book.add(name + " template offline", offline, "ms", NAN, NAN, Better::None);
     book.add(name + " memory", static_cast<double>(part.localizer.memory_bytes()) / 1e6, "MB", NAN, 10);
   }
@@ -131,11 +164,10 @@ void growth_with_members(Book& book) {
 }  // namespace
 
 void speed(Book& book) {
-  if (!book.wanted("time")) return;
-  growth_with_points(book);
-  against_paper(book);
-  threads(book);
-  growth_with_members(book);
+  if (book.wanted("time points")) growth_with_points(book);
+  if (book.wanted("time paper")) against_paper(book);
+  if (book.wanted("time threads")) threads(book);
+  if (book.wanted("time members")) growth_with_members(book);
 }
 
 }  // namespace weldcell::bench
