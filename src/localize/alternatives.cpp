@@ -24,6 +24,9 @@ constexpr double kAgainst = -0.15;
 constexpr double kRoom_mm = 10;
 /// Members farther apart than this hide nothing of each other.
 constexpr double kBeside_mm = 5;
+/// An edge shows its ends right within a box when all is known so far around it: joints and the shortest
+/// edges reach less far.
+constexpr double kBeyond_mm = 12;
 /// Below this nothing is worth a closer look.
 constexpr double kHopeless_nats = 3;
 
@@ -36,6 +39,10 @@ bool apart(const Box2& a, const Box2& b) {
 }
 
 Box2 grown(const Box2& box, double by) { return {Vec2(box.min.array() - by), Vec2(box.max.array() + by)}; }
+
+Box2 common(const Box2& a, const Box2& b) { return {a.min.cwiseMax(b.min), a.max.cwiseMin(b.max)}; }
+
+const Box2 kEverywhere{Vec2::Constant(-1e9), Vec2::Constant(1e9)};
 
 Polygon shifted(const Polygon& polygon, const Vec2& by) {
   Polygon out = polygon;
@@ -99,18 +106,24 @@ Alternatives::Alternatives(const workpiece::OutlineTemplate& outline, const std:
 }
 
 Alternatives::Region Alternatives::around(std::size_t member) const {
-  return inside(grown(bounds(members_[member]), kMost_mm + kRoom_mm));
+  return inside(grown(boxes_[member], kMost_mm + kRoom_mm));
 }
 
 Alternatives::Region Alternatives::inside(const Box2& box) const {
   Region out;
   out.box = box;
-  std::copy_if(spots_.begin(), spots_.end(), std::back_inserter(out.spots),
-               [&](const Spot& s) { return in_box(s.place, out.box); });
+  for (auto s = first_from(box.min.x()); s != spots_.end() && s->place.x() <= box.max.x(); ++s) {
+    if (in_box(s->place, box)) out.spots.push_back(*s);
+  }
   std::copy_if(pieces_.begin(), pieces_.end(), std::back_inserter(out.pieces), [&](const Piece& p) {
     return !apart({p.from.cwiseMin(p.to), p.from.cwiseMax(p.to)}, out.box);
   });
   return out;
+}
+
+std::vector<Alternatives::Spot>::const_iterator Alternatives::first_from(double x) const {
+  return std::lower_bound(spots_.begin(), spots_.end(), x,
+                          [](const Spot& s, double at) { return s.place.x() < at; });
 }
 
 int Alternatives::unseen_on(const std::vector<VisibleEdge>& edges, const Region& region) const {
@@ -140,52 +153,51 @@ int Alternatives::unseen_on(const std::vector<VisibleEdge>& edges, const Region&
   return out;
 }
 
-std::vector<VisibleEdge> Alternatives::visible(const std::vector<Polygon>& members, std::size_t member,
-                                               double joint_gap_mm) const {
+std::vector<VisibleEdge> Alternatives::visible(const Variant& part, std::size_t member, double joint_gap_mm,
+                                               const Box2& within) const {
   // Only what lies beside a member hides anything of it; the order of the others stays, since it decides who
   // shows a piece that two share.
-  if (members[member].empty()) return {};
-  const Box2 near = grown(bounds(members[member]), kBeside_mm);
+  if (outline_of(part, member).empty()) return {};
+  const Box2 near = common(grown(box_of(part, member), kBeside_mm), grown(within, kBeyond_mm));
   std::vector<Polygon> beside;
   std::size_t own = 0;
-  for (std::size_t m = 0; m < members.size(); ++m) {
-    if (members[m].empty() || apart(is_drawn(members, m) ? boxes_[m] : bounds(members[m]), near)) continue;
+  for (std::size_t m = 0; m < members_.size(); ++m) {
+    if (m != member && apart(box_of(part, m), near)) continue;
+    const Polygon& outline = outline_of(part, m);
+    if (outline.empty()) continue;
     if (m == member) own = beside.size();
-    beside.push_back(members[m]);
+    beside.push_back(outline);
   }
   std::vector<VisibleEdge> out = workpiece::visible_edges(beside, own, joint_gap_mm);
   for (VisibleEdge& edge : out) edge.member = static_cast<int>(member);
   return out;
 }
 
-bool Alternatives::is_drawn(const std::vector<Polygon>& members, std::size_t member) const {
-  return members[member] == members_[member];
-}
-
-std::vector<VisibleEdge> Alternatives::edges_within(const std::vector<Polygon>& members,
-                                                    const Region& region) const {
+std::vector<VisibleEdge> Alternatives::edges_within(const Variant& part, const Region& region) const {
   // Where a member is not as drawn here, what is beside its old or its new place may show other edges.
   std::vector<Box2> changed;
-  for (std::size_t m = 0; m < members.size(); ++m) {
-    if (is_drawn(members, m)) continue;
-    changed.push_back(grown(boxes_[m], kBeside_mm));
-    if (!members[m].empty()) changed.push_back(grown(bounds(members[m]), kBeside_mm));
+  if (part.outline != nullptr) {
+    changed.push_back(grown(boxes_[part.member], kBeside_mm));
+    if (!part.outline->empty()) changed.push_back(grown(part.box, kBeside_mm));
   }
+  const Box2 reached = grown(region.box, 2 * kOnEdge_mm);
+  const auto reaches = [&](const VisibleEdge& e) {
+    return !apart({e.line.a.cwiseMin(e.line.b), e.line.a.cwiseMax(e.line.b)}, reached);
+  };
   std::vector<VisibleEdge> edges;
-  for (std::size_t m = 0; m < members.size(); ++m) {
-    if (members[m].empty()) continue;
-    const bool drawn = is_drawn(members, m);
-    const Box2 own = drawn ? boxes_[m] : bounds(members[m]);
-    if (apart(own, region.box)) continue;
+  for (std::size_t m = 0; m < members_.size(); ++m) {
+    const Box2& own = box_of(part, m);
+    if (apart(own, region.box) || outline_of(part, m).empty()) continue;
     const bool anew =
-        !drawn || region.joint_gap_mm != kJointGap_mm ||
+        region.joint_gap_mm != kJointGap_mm ||
         std::any_of(changed.begin(), changed.end(), [&](const Box2& c) { return !apart(own, c); });
     if (anew) {
-      for (const VisibleEdge& edge : visible(members, m, region.joint_gap_mm)) edges.push_back(edge);
+      const std::vector<VisibleEdge> shown = visible(part, m, region.joint_gap_mm, region.box);
+      std::copy_if(shown.begin(), shown.end(), std::back_inserter(edges), reaches);
       continue;
     }
-    if (!drawn_[m]) drawn_[m] = visible(members_, m, kJointGap_mm);
-    edges.insert(edges.end(), drawn_[m]->begin(), drawn_[m]->end());
+    if (!drawn_[m]) drawn_[m] = visible({}, m, kJointGap_mm, kEverywhere);
+    std::copy_if(drawn_[m]->begin(), drawn_[m]->end(), std::back_inserter(edges), reaches);
   }
   return edges;
 }
@@ -211,38 +223,36 @@ double Alternatives::explained_nats(const std::vector<VisibleEdge>& edges, const
   return point_nats_ * static_cast<double>(std::count(explained.begin(), explained.end(), true));
 }
 
-double Alternatives::score(const std::vector<Polygon>& members, const Region& region) const {
-  const std::vector<VisibleEdge> edges = edges_within(members, region);
+double Alternatives::score(const Variant& part, const Region& region) const {
+  const std::vector<VisibleEdge> edges = edges_within(part, region);
   return explained_nats(edges, region) - unseen_nats_ * unseen_on(edges, region);
 }
 
 double Alternatives::whole() const {
   Region all;
-  all.box = {Vec2::Constant(-1e9), Vec2::Constant(1e9)};
+  all.box = kEverywhere;
   all.spots = spots_;
-  return explained_nats(edges_within(members_, all), all);
+  return explained_nats(edges_within({}, all), all);
 }
 
-double Alternatives::gain(const std::vector<Polygon>& instead, const Box2& within) const {
+double Alternatives::gain(std::size_t member, const Polygon& instead, const Box2& within) const {
   Region region = inside(grown(within, kSeenAt_mm));
   region.end_margin_mm = kLeastEndMargin_mm;
   // A point may lie on a side that a narrow slot shows; nobody has to have seen one there.
-  const auto nats = [&](const std::vector<Polygon>& members) {
+  const auto nats = [&](const Variant& part) {
     region.joint_gap_mm = kJointGap_mm;
-    const double explained = explained_nats(edges_within(members, region), region);
+    const double explained = explained_nats(edges_within(part, region), region);
     region.joint_gap_mm = kClosed_mm;
-    return explained - unseen_nats_ * unseen_on(edges_within(members, region), region);
+    return explained - unseen_nats_ * unseen_on(edges_within(part, region), region);
   };
-  return nats(instead) - nats(members_);
+  return nats({member, &instead, bounds(instead)}) - nats({});
 }
 
 double Alternatives::missing(int member) const {
   const auto m = static_cast<std::size_t>(member);
   const Region region = around(m);
-  std::vector<Polygon> members = members_;
-  const double drawn = score(members, region);
-  members[m].clear();
-  return score(members, region) - drawn;
+  const Polygon nothing;
+  return score({m, &nothing, boxes_[m]}, region) - score({}, region);
 }
 
 std::vector<Alternatives::Vote> Alternatives::votes(std::size_t member, const Region& region,
@@ -252,7 +262,7 @@ std::vector<Alternatives::Vote> Alternatives::votes(std::size_t member, const Re
     std::size_t axis;
   };
   const Polygon& outline = members_[member];
-  const Box2 box = grown(bounds(outline), kMost_mm + kOnEdge_mm);
+  const Box2 box = grown(boxes_[member], kMost_mm + kOnEdge_mm);
   const std::vector<Vec2> axes = axes_of(outline);
   const double slack = loosely ? kMost_mm : kOnEdge_mm;
   std::vector<Step> offsets;
@@ -298,14 +308,14 @@ std::vector<Alternatives::Vote> Alternatives::votes(std::size_t member, const Re
 /// Unexplained points on sides of others that this member should cover.
 int Alternatives::bared_by(std::size_t member, const Region& region) const {
   const Polygon& own = members_[member];
-  const Box2 box = grown(bounds(own), kOnEdge_mm);
+  const Box2 box = grown(boxes_[member], kOnEdge_mm);
   int out = 0;
   for (const Spot& s : region.spots) {
     if (!s.free || !in_box(s.place, box)) continue;
     bool on_hidden_side = false;
     for (std::size_t m = 0; m < members_.size() && !on_hidden_side; ++m) {
       const Polygon& other = members_[m];
-      if (m == member || !in_box(s.place, grown(bounds(other), kOnEdge_mm))) continue;
+      if (m == member || !in_box(s.place, grown(boxes_[m], kOnEdge_mm))) continue;
       for (std::size_t k = 0; k < other.size() && !on_hidden_side; ++k) {
         const Segment side{other[k], other[(k + 1) % other.size()]};
         const Vec2 d = side.direction(), n(d.y(), -d.x());
@@ -324,15 +334,14 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
   Displacement best;
   best.member = member;
   if (members_[m].empty()) return best;
-  const Box2 reach = grown(bounds(members_[m]), kMost_mm + kRoom_mm);
-  const bool idle = std::none_of(spots_.begin(), spots_.end(),
-                                 [&](const Spot& s) { return s.free && in_box(s.place, reach); });
-  if (idle && unseen_[m] == 0) return best;
   Region region = around(m);
+  const bool idle =
+      std::none_of(region.spots.begin(), region.spots.end(), [](const Spot& s) { return s.free; });
+  if (idle && unseen_[m] == 0) return best;
   const std::vector<Vote> found = votes(m, region, anywhere);
   const int bared = bared_by(m, region);
   const double lost =
-      unseen_[m] > 0 ? unseen_nats_ * unseen_on(visible(members_, m, kJointGap_mm), region) : 0;
+      unseen_[m] > 0 ? unseen_nats_ * unseen_on(visible({}, m, kJointGap_mm, region.box), region) : 0;
 
   struct Trial {
     Vec2 shift;
@@ -353,15 +362,16 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
     for (const double by : {-48.0, -32.0, -20.0, -12.0, -6.0, 6.0, 12.0, 20.0, 32.0, 48.0})
       trials.push_back({by * axis, 0});
   }
-  std::vector<Polygon> members = members_;
   bool drawn_known = false;
   for (const Trial& trial : trials) {
     const double most = point_nats_ * (trial.points + bared) + lost;
     if (trial.shift.norm() < kLeast_mm || most < kHopeless_nats) continue;
-    members[m] = shifted(members_[m], trial.shift);
-    if (most - unseen_nats_ * unseen_on(visible(members, m, kJointGap_mm), region) < kHopeless_nats) continue;
-    if (!drawn_known) region.drawn_nats = score(members_, region), drawn_known = true;
-    const double gain = score(members, region) - region.drawn_nats;
+    const Polygon moved = shifted(members_[m], trial.shift);
+    const Variant part{m, &moved, bounds(moved)};
+    if (most - unseen_nats_ * unseen_on(visible(part, m, kJointGap_mm, region.box), region) < kHopeless_nats)
+      continue;
+    if (!drawn_known) region.drawn_nats = score({}, region), drawn_known = true;
+    const double gain = score(part, region) - region.drawn_nats;
     if (gain > best.gain_nats) best = {member, trial.shift, trial.points, gain};
   }
   return best;

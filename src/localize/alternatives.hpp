@@ -34,9 +34,9 @@ class Alternatives {
   /// Log-likelihood of a part without the member over the drawing as it is, nats.
   double missing(int member) const;
 
-  /// Log-likelihood, over the drawing as it is, of a part whose members are these and differ from it within
-  /// the box only, nats.
-  double gain(const std::vector<Polygon>& instead, const Box2& within) const;
+  /// Log-likelihood, over the drawing as it is, of a part that has this outline instead of the member's and
+  /// differs within the box only, nats.
+  double gain(std::size_t member, const Polygon& instead, const Box2& within) const;
   /// The members' outlines where the fit has them, frame Part.
   const std::vector<Polygon>& members() const { return members_; }
 
@@ -63,6 +63,12 @@ class Alternatives {
     double by_mm = 0;
     int points = 0;
   };
+  /// The part as fitted, or with another outline instead of one member's.
+  struct Variant {
+    std::size_t member = 0;
+    const Polygon* outline = nullptr;  ///< empty: without the member
+    Box2 box;
+  };
   /// What lies within reach of one member.
   struct Region {
     Box2 box;
@@ -75,22 +81,28 @@ class Alternatives {
 
   Region around(std::size_t member) const;
   Region inside(const Box2& box) const;
-  std::vector<workpiece::VisibleEdge> edges_within(const std::vector<Polygon>& members,
-                                                   const Region& region) const;
-  /// Whether the member lies where members_ has it.
-  bool is_drawn(const std::vector<Polygon>& members, std::size_t member) const;
-  /// The edges that a member of the drawing shows.
-  std::vector<workpiece::VisibleEdge> visible(const std::vector<Polygon>& members, std::size_t member,
-                                              double joint_gap_mm) const;
+  /// The first of spots_ at x or beyond.
+  std::vector<Spot>::const_iterator first_from(double x) const;
+  const Polygon& outline_of(const Variant& part, std::size_t member) const {
+    return part.outline != nullptr && part.member == member ? *part.outline : members_[member];
+  }
+  const Box2& box_of(const Variant& part, std::size_t member) const {
+    return part.outline != nullptr && part.member == member ? part.box : boxes_[member];
+  }
+  /// The edges that lie within the region's box; beyond it they may lack cuts.
+  std::vector<workpiece::VisibleEdge> edges_within(const Variant& part, const Region& region) const;
+  /// The edges that a member shows within a box; beyond it they may lack cuts.
+  std::vector<workpiece::VisibleEdge> visible(const Variant& part, std::size_t member, double joint_gap_mm,
+                                              const Box2& within) const;
   double explained_nats(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
-  double score(const std::vector<Polygon>& members, const Region& region) const;
+  double score(const Variant& part, const Region& region) const;
   int unseen_on(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
   std::vector<Vote> votes(std::size_t member, const Region& region, bool loosely) const;
   int bared_by(std::size_t member, const Region& region) const;
 
   std::vector<Polygon> members_;  ///< where the fit has them, frame Part
   std::vector<Box2> boxes_;       ///< of members_
-  /// Visible edges of members_, made when first asked for: not for more than one thread.
+  /// All visible edges of members_, made when first asked for: not for more than one thread.
   mutable std::vector<std::optional<std::vector<workpiece::VisibleEdge>>> drawn_;
   std::vector<Spot> spots_;  ///< by x
   std::vector<Piece> pieces_;

@@ -49,7 +49,7 @@ FitState polish(const TemplateFields& fields, const std::vector<Crossing>& cross
   priors.inset_mm = 0;
   FitState state;
   state.pose = start;
-  NormalEquations equations(fields.member_centroids(), priors);
+  NormalEquations equations({Vec2::Zero()}, priors);  // members rigid: the part is one
   double scale = first_scale_mm;
   for (int step = 0; step < 12; ++step) {
     const double c = std::cos(state.pose.theta_rad), s = std::sin(state.pose.theta_rad);
@@ -60,7 +60,7 @@ FitState polish(const TemplateFields& fields, const std::vector<Crossing>& cross
       const Row row = row_of(fields, crossing, m, c, s, false);
       const double miss = squared_miss(net_residual(fields, row, m, state), m);
       const double ratio = 1 + miss / (scale * scale);
-      equations.add(fields.edges()[static_cast<std::size_t>(m.edge)].member, row, 1 / (ratio * ratio));
+      equations.add(0, row, 1 / (ratio * ratio));
     }
     const Common step_found = equations.solve_rigid();
     if (!step_found.allFinite()) break;

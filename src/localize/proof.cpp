@@ -74,18 +74,14 @@ bool alike(const Segment& a, const Segment& b) {
          (a.a - b.b).norm() + (a.b - b.a).norm() < kSamePass_mm;
 }
 
-/// What one member could be without the scan having shown it; `members` are as fitted, and so again in the
-/// end.
+/// What one member could be without the scan having shown it; `visible` are its edges on the drawing.
 void add_unproven(const Situation& s, const Alternatives& alternatives, const PointsOnSides& points,
-                  double by_mm, std::size_t m, std::vector<Polygon>& members, std::vector<Unproven>& out) {
-  const Polygon drawn = members[m];
-  for (Departure& departure :
-       workpiece::departures(members, s.outline.edges, m, by_mm, s.options.prove_free_ends)) {
-    if (held_by_points(departure, drawn, points)) continue;
-    members[m] = departure.instead;
-    const double gain = alternatives.gain(members, departure.reach);
-    members[m] = drawn;
-    if (gain <= -kRefuted_nats) continue;
+                  double by_mm, std::size_t m, std::span<const workpiece::VisibleEdge> visible,
+                  std::vector<Unproven>& out) {
+  const std::vector<Polygon>& members = alternatives.members();
+  for (Departure& departure : workpiece::departures(members, visible, m, by_mm, s.options.prove_free_ends)) {
+    if (held_by_points(departure, members[m], points)) continue;
+    if (alternatives.gain(m, departure.instead, departure.reach) <= -kRefuted_nats) continue;
     const std::optional<Segment> pass = workpiece::telling_pass(members, departure);
     if (!pass || std::any_of(out.begin(), out.end(), [&](const Unproven& u) { return alike(u.pass, *pass); }))
       continue;
@@ -97,13 +93,15 @@ void add_unproven(const Situation& s, const Alternatives& alternatives, const Po
 
 std::vector<Unproven> unproven(const Situation& s, const Alternatives& alternatives) {
   const PointsOnSides points(s);
-  std::vector<Polygon> members = alternatives.members();
+  std::vector<std::vector<workpiece::VisibleEdge>> visible(s.outline.members.size());
+  for (const workpiece::VisibleEdge& e : s.outline.edges)
+    visible[static_cast<std::size_t>(e.member)].push_back(e);
   std::vector<Unproven> out;
-  for (std::size_t m = 0; m < members.size(); ++m) {
-    add_unproven(s, alternatives, points, s.options.prove_shift_mm, m, members, out);
+  for (std::size_t m = 0; m < visible.size(); ++m) {
+    add_unproven(s, alternatives, points, s.options.prove_shift_mm, m, visible[m], out);
     // An end that lies deep in another member comes to light only farther off.
     if (s.options.prove_shift_mm < kFarther_mm)
-      add_unproven(s, alternatives, points, kFarther_mm, m, members, out);
+      add_unproven(s, alternatives, points, kFarther_mm, m, visible[m], out);
   }
   std::stable_sort(out.begin(), out.end(),
                    [](const Unproven& a, const Unproven& b) { return a.departure.end && !b.departure.end; });

@@ -132,14 +132,22 @@ bool among(const Met& one, const std::vector<Met>& all) {
   });
 }
 
-/// Edges of all members near the box, one of them as given.
-std::vector<VisibleEdge> edges_near(std::span<const Polygon> members, const Box2& box) {
-  std::vector<VisibleEdge> out;
+bool apart(const Box2& a, const Box2& b) {
+  return (a.min.array() > b.max.array()).any() || (b.min.array() > a.max.array()).any();
+}
+
+/// Edges that the members show near the box, one of them with another outline; farther off they may lack
+/// cuts.
+std::vector<VisibleEdge> edges_near(std::span<const Polygon> members, std::size_t member,
+                                    const Polygon& outline, const Box2& box) {
+  std::vector<Polygon> beside;  // in their order, which decides who shows a piece that two share
   for (std::size_t m = 0; m < members.size(); ++m) {
-    if (members[m].empty()) continue;
-    const Box2 own = bounds(members[m]);
-    if ((own.min.array() > box.max.array()).any() || (box.min.array() > own.max.array()).any()) continue;
-    for (const VisibleEdge& edge : visible_edges(members, m, kClosed_mm)) out.push_back(edge);
+    const Polygon& one = m == member ? outline : members[m];
+    if (!one.empty() && !apart(bounds(one), box)) beside.push_back(one);
+  }
+  std::vector<VisibleEdge> out;
+  for (std::size_t m = 0; m < beside.size(); ++m) {
+    for (const VisibleEdge& edge : visible_edges(beside, m, kClosed_mm)) out.push_back(edge);
   }
   return out;
 }
@@ -199,10 +207,8 @@ Views views_of(std::span<const Polygon> members, const Departure& departure) {
   out.near = departure.reach;
   out.near.min.array() -= 5 * kRunUp_mm;
   out.near.max.array() += 5 * kRunUp_mm;
-  std::vector<Polygon> other(members.begin(), members.end());
-  out.drawn = edges_near(other, out.near);
-  other[m] = departure.instead;
-  out.instead = edges_near(other, out.near);
+  out.drawn = edges_near(members, m, members[m], out.near);
+  out.instead = edges_near(members, m, departure.instead, out.near);
   out.passes =
       departure.side >= 0 ? passes_across(members[m], departure) : passes_near_end(members[m], departure);
   return out;

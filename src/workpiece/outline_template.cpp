@@ -43,32 +43,54 @@ struct Cover {
       offsets_mm;  ///< along the outward normal: the side is hidden where a so shifted point is inside
 };
 
-bool hidden(const Vec2& p, const Vec2& outward, const std::vector<Cover>& covers) {
+bool hidden_by(const Cover& cover, const Vec2& p, const Vec2& outward) {
+  if ((p.array() < cover.box.min.array()).any() || (p.array() > cover.box.max.array()).any()) return false;
+  return std::any_of(cover.offsets_mm.begin(), cover.offsets_mm.end(),
+                     [&](double offset) { return contains(*cover.polygon, p + offset * outward); });
+}
+
+/// Covers with the stretch of a side that they may hide, as parameters along it, by its start.
+struct Stretch {
+  double from, to;
+  const Cover* cover;
+};
+std::vector<Stretch> stretches(const Segment& side, const std::vector<Cover>& covers) {
+  constexpr double kSlack = 1e-9;
+  const Box2 own{side.a.cwiseMin(side.b), side.a.cwiseMax(side.b)};
+  const Vec2 d = side.b - side.a;
+  std::vector<Stretch> out;
   for (const Cover& cover : covers) {
-    if ((p.array() < cover.box.min.array()).any() || (p.array() > cover.box.max.array()).any()) continue;
-    for (const double offset : cover.offsets_mm) {
-      if (contains(*cover.polygon, p + offset * outward)) return true;
-    }
+    if (apart(own, cover.box, 0)) continue;
+    const Vec2 half = (cover.box.max - cover.box.min) / 2;
+    const double middle = (cover.box.min + half - side.a).dot(d) / d.squaredNorm();
+    const double reach = half.dot(d.cwiseAbs()) / d.squaredNorm() + kSlack;
+    out.push_back({middle - reach, middle + reach, &cover});
   }
-  return false;
+  std::sort(out.begin(), out.end(), [](const Stretch& a, const Stretch& b) { return a.from < b.from; });
+  return out;
 }
 
 /// The visible intervals of a side, as parameters along it.
 std::vector<std::pair<double, double>> visible_intervals(const Segment& side, const Vec2& outward,
                                                          const std::vector<Cover>& covers) {
+  const std::vector<Stretch> near = stretches(side, covers);
   std::vector<double> cuts{0, 1};
-  const Box2 own{side.a.cwiseMin(side.b), side.a.cwiseMax(side.b)};
-  for (const Cover& cover : covers) {
-    if (apart(own, cover.box, 0)) continue;
-    for (const double offset : cover.offsets_mm)
-      append_crossings(shifted(side, offset * outward), *cover.polygon, cuts);
+  for (const Stretch& stretch : near) {
+    for (const double offset : stretch.cover->offsets_mm)
+      append_crossings(shifted(side, offset * outward), *stretch.cover->polygon, cuts);
   }
   std::sort(cuts.begin(), cuts.end());
   std::vector<std::pair<double, double>> out;
+  auto first = near.begin();  // those before it end before the interval
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
-    const double from = cuts[i], to = cuts[i + 1];
+    const double from = cuts[i], to = cuts[i + 1], at = (from + to) / 2;
     if (to - from <= 1e-9) continue;
-    if (hidden(side.a + (from + to) / 2 * (side.b - side.a), outward, covers)) continue;
+    while (first != near.end() && first->to < at) ++first;
+    const Vec2 place = side.a + at * (side.b - side.a);
+    bool hidden = false;
+    for (auto s = first; s != near.end() && s->from <= at && !hidden; ++s)
+      hidden = hidden_by(*s->cover, place, outward);
+    if (hidden) continue;
     if (!out.empty() && from - out.back().second <= 1e-9) {
       out.back().second = to;
     } else {

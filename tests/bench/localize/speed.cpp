@@ -22,17 +22,15 @@ Setting wide_setting(double pitch_mm) {
 /// Median time of each stage and of the whole over sets of about so many points, ms.
 void stages(Book& book, const std::string& name, const PartUnderTest& part, const Setting& setting,
             int trials) {
-  using Clock = std::chrono::steady_clock;
   constexpr std::array<const char*, 5> kNames{"search", "polish", "refine", "rivals", "verdict"};
   std::array<std::vector<double>, kNames.size()> spent;
   const localize::LocalizeOptions options = options_for(setting);
   for (int i = 0; i < trials; ++i) {
     const EdgeSet set = make_set(part.outline(), setting, book.options.seed + static_cast<std::uint64_t>(i));
-    Clock::time_point last = Clock::now();
+    double last = cpu_ms();
     part.localizer.localize(set.edges, set.path, options, [&](localize::Stage stage) {
-      const Clock::time_point now = Clock::now();
-      spent[static_cast<std::size_t>(stage)].push_back(
-          std::chrono::duration<double, std::milli>(now - last).count());
+      const double now = cpu_ms();
+      spent[static_cast<std::size_t>(stage)].push_back(now - last);
       last = now;
     });
   }
@@ -133,6 +131,7 @@ void growth_with_members(Book& book) {
   for (const int rungs : {2, 8, 30, 98}) parts.push_back(comb(rungs));
   double fewest_members = 0, same = 0;
   for (const workpiece::Workpiece& workpiece : parts) {
+    if (!book.wanted("time members " + std::to_string(workpiece.members.size()))) continue;
     const double start = cpu_ms();
     const PartUnderTest part = part_under_test(workpiece);
     const double offline = cpu_ms() - start;
@@ -152,13 +151,14 @@ void growth_with_members(Book& book) {
              NAN, Better::None);
     s.pitch_mm = pitch_for(part, kSamePoints, book.options.seed);
     same = run_cell(part, s, trials, book.options.seed, solver_of(part, s)).milliseconds(0.5);
-    if (fewest_members == 0) fewest_members = same;
+    if (workpiece.members.size() == 2) fewest_members = same;
     book.add(name + " median at 800 points", same, "ms", NAN, NAN, Better::None);
     stages(book, name + ", 800 points,", part, s, trials);
     book.add(name + " template offline", offline, "ms", NAN, NAN, Better::None);
     book.add(name + " memory", static_cast<double>(part.localizer.memory_bytes()) / 1e6, "MB", NAN, 10);
   }
-  book.add("time 100 members / 2 members, 800 points", same / fewest_members, "x", NAN, 2);
+  if (fewest_members > 0)
+    book.add("time 100 members / 2 members, 800 points", same / fewest_members, "x", NAN, 2);
 }
 
 }  // namespace
@@ -167,7 +167,7 @@ void speed(Book& book) {
   if (book.wanted("time points")) growth_with_points(book);
   if (book.wanted("time paper")) against_paper(book);
   if (book.wanted("time threads")) threads(book);
-  if (book.wanted("time members")) growth_with_members(book);
+  growth_with_members(book);
 }
 
 }  // namespace weldcell::bench
