@@ -66,7 +66,8 @@ std::vector<Vec2> axes_of(const Polygon& outline) {
 }  // namespace
 
 Alternatives::Alternatives(const workpiece::OutlineTemplate& outline, const std::vector<Crossing>& crossings,
-                           std::span<const PathPiece> path, const Fit& fit, const Evidence& evidence) {
+                           std::span<const PathPiece> path, const Fit& fit, const Evidence& evidence)
+    : outlines_(outline.members) {
   for (std::size_t m = 0; m < outline.members.size(); ++m) {
     const MemberShift& u = fit.state.members[m];
     const Vec2 about = centroid(outline.members[m]);
@@ -255,14 +256,13 @@ double Alternatives::missing(int member) const {
   return score({m, &nothing, boxes_[m]}, region) - score({}, region);
 }
 
-std::vector<Alternatives::Vote> Alternatives::votes(std::size_t member, const Region& region,
+std::vector<Alternatives::Vote> Alternatives::votes(const Polygon& outline, const Region& region,
                                                     bool loosely) const {
   struct Step {
     double by_mm;
     std::size_t axis;
   };
-  const Polygon& outline = members_[member];
-  const Box2 box = grown(boxes_[member], kMost_mm + kOnEdge_mm);
+  const Box2 box = grown(bounds(outline), kMost_mm + kOnEdge_mm);
   const std::vector<Vec2> axes = axes_of(outline);
   const double slack = loosely ? kMost_mm : kOnEdge_mm;
   std::vector<Step> offsets;
@@ -338,7 +338,18 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
   const bool idle =
       std::none_of(region.spots.begin(), region.spots.end(), [](const Spot& s) { return s.free; });
   if (idle && unseen_[m] == 0) return best;
-  const std::vector<Vote> found = votes(m, region, anywhere);
+  displaced_from(members_[m], anywhere, region, best);
+  // A fit that followed a displaced member half the way has turned it as well.
+  if (anywhere) displaced_from(outlines_[m], anywhere, region, best);
+  return best;
+}
+
+/// Weighs the displacements of an outline that points vote for, and puts a better one in the place of best.
+void Alternatives::displaced_from(const Polygon& outline, bool anywhere, Region& region,
+                                  Displacement& best) const {
+  const auto m = static_cast<std::size_t>(best.member);
+  const std::vector<Vote> found = votes(outline, region, anywhere);
+  const std::vector<Vec2> axes = axes_of(outline);
   const int bared = bared_by(m, region);
   const double lost =
       unseen_[m] > 0 ? unseen_nats_ * unseen_on(visible({}, m, kJointGap_mm, region.box), region) : 0;
@@ -357,24 +368,22 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
                         found[i].points + found[k].points});
     }
   }
-  for (std::size_t i = 0; bared > 0 && i < axes_of(members_[m]).size(); ++i) {
-    const Vec2 axis = axes_of(members_[m])[i];
+  for (std::size_t i = 0; bared > 0 && i < axes.size(); ++i) {
     for (const double by : {-48.0, -32.0, -20.0, -12.0, -6.0, 6.0, 12.0, 20.0, 32.0, 48.0})
-      trials.push_back({by * axis, 0});
+      trials.push_back({by * axes[i], 0});
   }
   bool drawn_known = false;
   for (const Trial& trial : trials) {
     const double most = point_nats_ * (trial.points + bared) + lost;
     if (trial.shift.norm() < kLeast_mm || most < kHopeless_nats) continue;
-    const Polygon moved = shifted(members_[m], trial.shift);
+    const Polygon moved = shifted(outline, trial.shift);
     const Variant part{m, &moved, bounds(moved)};
     if (most - unseen_nats_ * unseen_on(visible(part, m, kJointGap_mm, region.box), region) < kHopeless_nats)
       continue;
     if (!drawn_known) region.drawn_nats = score({}, region), drawn_known = true;
     const double gain = score(part, region) - region.drawn_nats;
-    if (gain > best.gain_nats) best = {member, trial.shift, trial.points, gain};
+    if (gain > best.gain_nats) best = {best.member, trial.shift, trial.points, gain};
   }
-  return best;
 }
 
 }  // namespace weldcell::localize

@@ -97,11 +97,13 @@ class Alternatives {
   double explained_nats(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
   double score(const Variant& part, const Region& region) const;
   int unseen_on(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
-  std::vector<Vote> votes(std::size_t member, const Region& region, bool loosely) const;
+  std::vector<Vote> votes(const Polygon& outline, const Region& region, bool loosely) const;
+  void displaced_from(const Polygon& outline, bool anywhere, Region& region, Displacement& best) const;
   int bared_by(std::size_t member, const Region& region) const;
 
-  std::vector<Polygon> members_;  ///< where the fit has them, frame Part
-  std::vector<Box2> boxes_;       ///< of members_
+  std::vector<Polygon> outlines_;  ///< as drawn, frame Part
+  std::vector<Polygon> members_;   ///< where the fit has them, frame Part
+  std::vector<Box2> boxes_;        ///< of members_
   /// All visible edges of members_, made when first asked for: not for more than one thread.
   mutable std::vector<std::optional<std::vector<workpiece::VisibleEdge>>> drawn_;
   std::vector<Spot> spots_;  ///< by x

@@ -15,21 +15,12 @@
 #include "proof.hpp"
 #include "weldcell/base/units.hpp"
 #include "wording.hpp"
+#include "wrong_part.hpp"
 
 namespace weldcell::localize {
 
 namespace {
 
-/// Odds of about 1000 : 1.
-constexpr double kAmbiguous_nats = 7;
-/// Another reading of the same points must be this much better to be named as the cause.
-constexpr double kClearly_nats = 15;
-/// Per point, on average: about two thirds of the points lie on the part.
-constexpr double kExplains_nats = 2.7;
-constexpr double kNothing_nats = -1e300;
-/// One of some hundred places of some members, on a part that is hardly ever wrong.
-constexpr double kDisplaced_nats = 9;
-constexpr double kDoubtful_nats = 7;
 constexpr double kMinInlierShare = 0.35;
 constexpr double kMinRate = 0.5;
 /// What a pose must be known to when no weld says so more exactly, and how likely it may be farther off:
@@ -39,165 +30,6 @@ constexpr double kPoseBound_rad = rad(0.2);
 constexpr double kMostFartherOff = 0.09;
 /// A pose with a longer tail than this (1 sigma) is not placed, however unlikely the tail.
 constexpr double kMostSigma_mm = 0.75;
-
-void say(Localization& result, Verdict verdict, const char* cause, std::string reason) {
-  result.verdict = verdict;
-  result.cause = cause;
-  result.reason = std::move(reason);
-}
-
-const std::string& member_name(const Situation& s, int member) {
-  return s.outline.member_names[static_cast<std::size_t>(member)];
-}
-
-/// Whether the found pose leaves anything to explain.
-bool suspicious(const Situation& s, const Localization& result) {
-  if (result.inliers < 0.6 * static_cast<double>(s.crossings.size())) return true;
-  if (!s.evidence.has_path) {
-    return std::any_of(s.fit.member_points.begin(), s.fit.member_points.end(), [](int n) { return n == 0; });
-  }
-  if (s.evidence.seen < 0.85 * s.evidence.expected) return true;
-  return std::any_of(s.evidence.members.begin(), s.evidence.members.end(),
-                     [](const MemberEvidence& m) { return m.expected >= 3 && m.seen < 0.6 * m.expected; });
-}
-
-/// The best fit of these crossings anywhere in the box: its log-likelihood, or nothing when it explains them
-/// badly.
-double best_elsewhere(const Situation& s, const std::vector<Crossing>& crossings, const SearchBox& box,
-                      FitState* found) {
-  const std::vector<Crossing> sample = sampled(crossings, 400);
-  const std::vector<Crossing> few = sampled(crossings, kSearchPoints);
-  double best = kNothing_nats;
-  for (const Mode& mode : search(s.fields, crossings, box, 8)) {
-    const FitState state = polish(s.fields, few, mode.pose, 12, nullptr);
-    const double likelihood = rough_log_likelihood(s.fields, sample, state);
-    if (likelihood <= best) continue;
-    best = likelihood;
-    *found = state;
-  }
-  return best > -kExplains_nats * static_cast<double>(sample.size()) ? best : kNothing_nats;
-}
-
-std::vector<Crossing> mirrored(const std::vector<Crossing>& crossings, const Vec2& about) {
-  std::vector<Crossing> out = crossings;
-  for (Crossing& c : out) {
-    c.point.y() = 2 * about.y() - c.point.y();
-    c.direction.y() = -c.direction.y();
-    c.inward.y() = -c.inward.y();
-    c.inward_rad = -c.inward_rad;
-  }
-  return out;
-}
-
-/// Whether the mirror image of the part, or the part outside the allowed range, explains the points clearly
-/// better.
-bool explained_elsewhere(const Situation& s, Localization& result) {
-  const Vec2 planned = s.options.planned * s.outline.centroid;
-  const double reach = std::min(1.5 * s.options.range_mm + 50, 400.0);
-  // Members as drawn on either side of the comparison, and each pose where it then fits best.
-  const std::vector<Crossing> sample = sampled(s.crossings, 400);
-  FitState rigid = s.fit.state;
-  std::fill(rigid.members.begin(), rigid.members.end(), MemberShift::Zero());
-  const FitState settled = polish(s.fields, sampled(s.crossings, kSearchPoints), rigid.pose, 12, nullptr);
-  const double here = kClearly_nats + std::max(rough_log_likelihood(s.fields, sample, rigid),
-                                               rough_log_likelihood(s.fields, sample, settled));
-  // The mirror line runs through the planned origin, so a part drawn about its origin keeps its place.
-  const SearchBox anywhere{{planned, s.options.planned.theta_rad}, reach, kPi, Vec2(-s.outline.centroid)};
-  FitState outside, mirror;
-  const double of_outside = best_elsewhere(s, s.crossings, anywhere, &outside);
-  const double of_mirror =
-      best_elsewhere(s, mirrored(s.crossings, s.options.planned.translation()), anywhere, &mirror);
-  if (std::max(of_outside, of_mirror) <= here) return false;
-  const double turn = wrap_pi(outside.pose.theta_rad - s.options.planned.theta_rad);
-  // What a place outside the range explains as well is no mirror image: the drawing may be its own one.
-  if (of_mirror > of_outside + kAmbiguous_nats) {
-    say(result, Verdict::Reject, "mirrored",
-        fmt::format("The part is the mirror image of drawing {}. Turn it over or load the mirrored job.",
-                    s.outline.name));
-    return true;
-  }
-  const bool either =
-      of_mirror > of_outside - kAmbiguous_nats && std::abs(turn) > s.options.range_rad + rad(2);
-  say(result, Verdict::Reject, "out_of_range",
-      fmt::format(
-          "The part lies {} and {} away from its planned place, outside the allowed range{}. Move it to "
-          "the projected outline and scan again.",
-          millimetres((outside.pose.centre - planned).norm()), degrees(turn),
-          either ? ", or is the mirror image of drawing " + s.outline.name + ", which looks the same" : ""));
-  return true;
-}
-
-/// A member that points and travel find at another place, or not at all.
-bool member_elsewhere(const Situation& s, const Alternatives& alternatives, Localization& result) {
-  const std::vector<int> unseen = unseen_members(s.evidence);
-  Displacement best;
-  for (int m = 0; m < static_cast<int>(s.evidence.members.size()); ++m) {
-    const bool hardly_seen = std::find(unseen.begin(), unseen.end(), m) != unseen.end();
-    const Displacement d = alternatives.displaced(m, hardly_seen);
-    if (d.gain_nats > best.gain_nats) best = d;
-  }
-  double without = kNothing_nats;
-  if (!unseen.empty()) without = alternatives.missing(unseen.front());
-  if (best.gain_nats >= kDoubtful_nats && best.gain_nats > without) {
-    const std::string& name = member_name(s, best.member);
-    // What little evidence may still be chance: looking again settles it.
-    const bool sure = best.gain_nats >= kDisplaced_nats;
-    say(result, sure ? Verdict::Reject : Verdict::Rescan, "wrong_revision",
-        best.own_points > 0
-            ? fmt::format(
-                  "{} {} {} of its place on the drawing: another revision, or set up wrong. Check the part "
-                  "against drawing {}.",
-                  name, sure ? "lies" : "seems to lie", direction_on_drawing(best.shift), s.outline.name)
-            : fmt::format(
-                  "The joint of {} {} open: it is shorter than drawn, or not in its place. Check the part "
-                  "against drawing {}.",
-                  name, sure ? "stands" : "seems to stand", s.outline.name));
-    return true;
-  }
-  if (unseen.empty()) return false;
-  say(result, without >= kDisplaced_nats ? Verdict::Reject : Verdict::Rescan, "member_missing",
-      fmt::format("{} was not seen although the scan passed over its place. Put it in place and scan again.",
-                  member_name(s, unseen.front())));
-  return true;
-}
-
-bool member_off(const Situation& s, Localization& result) {
-  if (const auto& either = s.fit.either;
-      either && either->apart_mm > s.options.max_member_shift_mm + kEitherSlack_mm) {
-    say(result, Verdict::Reject, "wrong_revision",
-        fmt::format(
-            "{} or {} lies {} off its place on the drawing, more than the allowed {}. Set it right or "
-            "check the revision of drawing {}.",
-            member_name(s, either->first.member), member_name(s, either->second.member),
-            millimetres(either->apart_mm), millimetres(s.options.max_member_shift_mm), s.outline.name));
-    return true;
-  }
-  for (std::size_t m = 0; m < result.members.size(); ++m) {
-    const MemberPose& pose = result.members[m];
-    if (pose.points < 2) continue;
-    const double off = std::hypot(pose.dx_mm, pose.dy_mm);
-    if (off <= s.options.max_member_shift_mm + 2 * std::min(pose.sigma_mm, 0.5)) continue;
-    const Vec2 on_drawing = Pose2{0, 0, -result.pose.theta_rad}.rotate({pose.dx_mm, pose.dy_mm});
-    say(result, Verdict::Reject, "wrong_revision",
-        fmt::format(
-            "{} lies {} of its place on the drawing, more than the allowed {}. Set it right or check the "
-            "revision of drawing {}.",
-            pose.name, direction_on_drawing(on_drawing), millimetres(s.options.max_member_shift_mm),
-            s.outline.name));
-    return true;
-  }
-  return false;
-}
-
-bool wrong_part(const Situation& s, const Alternatives* alternatives, Localization& result) {
-  const bool looked = suspicious(s, result);
-  if (looked && explained_elsewhere(s, result)) return true;
-  if (!(alternatives != nullptr && member_elsewhere(s, *alternatives, result)) && !member_off(s, result))
-    return false;
-  // A nearly symmetric part turned by half a turn fits but for a member or two.
-  if (!looked) explained_elsewhere(s, result);
-  return true;
-}
 
 /// What could be other than drawn without this scan having shown it.
 bool not_looked_at(const Situation& s, const Alternatives& alternatives, Localization& result) {
@@ -327,20 +159,8 @@ bool ambiguous(const Situation& s, Localization& result) {
 }
 
 bool out_of_range(const Situation& s, Localization& result) {
-  Offset off = offset_from_planned(s.outline, s.options.planned, result.pose);
-  // A part whose centroid or whose origin keeps the limits keeps them.
-  const double dx = result.pose.x_mm - s.options.planned.x_mm, dy = result.pose.y_mm - s.options.planned.y_mm;
-  if (std::max(std::abs(dx), std::abs(dy)) < std::max(std::abs(off.dx_mm), std::abs(off.dy_mm))) {
-    off.dx_mm = dx;
-    off.dy_mm = dy;
-  }
-  const auto beyond = [](double value, double limit, double slack) {
-    return std::abs(value) > 1.02 * limit + slack;
-  };
-  if (!beyond(off.dx_mm, s.options.max_offset_mm, 0.5) && !beyond(off.dy_mm, s.options.max_offset_mm, 0.5) &&
-      !beyond(off.dtheta_rad, s.options.max_rotation_rad, rad(0.1))) {
-    return false;
-  }
+  if (within_limits(s, result.pose)) return false;
+  const Offset off = offset_from_planned(s.outline, s.options.planned, result.pose);
   say(result, Verdict::Reject, "out_of_range",
       fmt::format("The part lies {} and {} away from its planned place; {} and {} are allowed. Move it to "
                   "the projected "
