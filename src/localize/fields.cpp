@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slips.hpp"
 #include "weldcell/base/units.hpp"
 
 namespace weldcell::localize {
@@ -62,6 +63,7 @@ TemplateFields::TemplateFields(const workpiece::OutlineTemplate& outline) : radi
   starts_.assign(1, 0);
   for (int bin = 0; bin < kAllBins; ++bin) fill(bin);
   candidates_.shrink_to_fit();
+  slips_ = slips_of(*this);
 }
 
 void TemplateFields::lay_grid(const workpiece::OutlineTemplate& outline) {

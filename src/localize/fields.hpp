@@ -38,6 +38,8 @@ class TemplateFields {
   const std::vector<FieldEdge>& edges() const { return edges_; }
   const std::vector<Vec2>& member_centroids() const { return member_centroids_; }
   double radius_mm() const { return radius_mm_; }
+  /// Shifts of a pitch between members by which the outline nearly covers itself (slips.hpp).
+  const std::vector<Vec2>& slips() const { return slips_; }
 
   /// Score 0..255 of each cell, row by row: 255 on an edge, 0 from kReach_mm on.
   const std::uint16_t* scores(int bin) const {
@@ -60,7 +62,7 @@ class TemplateFields {
   std::size_t cells_ = 0;
   Vec2 origin_ = Vec2::Zero();
   std::vector<FieldEdge> edges_;
-  std::vector<Vec2> member_centroids_;
+  std::vector<Vec2> member_centroids_, slips_;
   std::vector<std::uint16_t> scores_;
   std::vector<std::uint32_t> starts_;
   std::vector<std::uint16_t> candidates_;

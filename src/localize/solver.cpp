@@ -9,6 +9,7 @@
 #include "evidence.hpp"
 #include "fit.hpp"
 #include "search.hpp"
+#include "slips.hpp"
 #include "weldcell/base/units.hpp"
 
 namespace weldcell::localize {
@@ -18,6 +19,8 @@ namespace {
 constexpr std::size_t kModes = 8;
 /// Beyond this a second mode need not be looked at more closely.
 constexpr double kFarBehind_nats = 40;
+/// Steps along members that stand side by side, where few points tell how far along.
+constexpr double kSlide_mm = 15;
 /// A millisecond that looks like so much turn at the farthest point is told apart from it by little.
 constexpr double kCoupled_mm_per_ms = 0.05;
 /// At least two points, so that no stray one alone tells which of two members is off.
@@ -91,8 +94,9 @@ class Solver {
   }
 
   void collect_candidates() {
-    const std::vector<Crossing> few = sampled(medium_, kSearchPoints);
+    std::vector<Crossing> few = sampled(medium_, kSearchPoints);
     const std::vector<Mode> modes = search(fields_, few, box_, kModes);
+    if (!fields_.slips().empty()) few = sampled_both_ways(medium_, kSearchPoints);
     end(Stage::Search);
     for (const Mode& mode : modes) {
       if (!candidates_.empty() && mode.score < 0.5 * best_score_) break;
@@ -101,15 +105,20 @@ class Solver {
     }
     if (candidates_.empty()) return;
     order();
+    add_slipped(few);
+    const CentredPose straight = candidates_.front().state.pose;
     add_turned(few);
     order();
+    if (!same_place(fields_, straight, candidates_.front().state.pose)) add_slipped(few);
     prefer_planned_turn();
   }
 
   void consider(const std::vector<Crossing>& few, const CentredPose& from, bool turned) {
-    Candidate candidate;
-    candidate.state = polish(fields_, few, from, turned ? 6 : 12, &iterations_);
-    candidate.turned = turned;
+    keep(polish(fields_, few, from, turned ? 6 : 12, &iterations_), turned);
+  }
+
+  void keep(const FitState& state, bool turned) {
+    Candidate candidate{state, 0, turned};
     if (!box_.holds(candidate.state.pose, 12, rad(1.5))) return;
     for (const Candidate& other : candidates_) {
       if (same_place(fields_, other.state.pose, candidate.state.pose)) return;
@@ -121,6 +130,29 @@ class Solver {
   void order() {
     std::stable_sort(candidates_.begin(), candidates_.end(),
                      [](const Candidate& a, const Candidate& b) { return a.likelihood > b.likelihood; });
+  }
+
+  /// Where members stand side by side at nearly one pitch, the search may be off by some of them, or along
+  /// them.
+  void add_slipped(const std::vector<Crossing>& few) {
+    for (bool better = !fields_.slips().empty(); better;) {
+      const Candidate from = candidates_.front();
+      const double least = rough_log_likelihood(fields_, few, from.state) - kFarBehind_nats;
+      const Pose2 turn{0, 0, from.state.pose.theta_rad};
+      for (const Vec2& slip : fields_.slips()) {
+        const Vec2 along = turn.rotate(slip), across = kSlide_mm * Vec2(-along.y(), along.x()).normalized();
+        for (const int steps : {-3, -2, -1, 1, 2, 3}) try_at(few, from.state.pose, steps * along, least);
+        for (const int steps : {-2, -1, 1, 2}) try_at(few, from.state.pose, steps * across, least);
+      }
+      order();
+      better = candidates_.front().likelihood > from.likelihood;
+    }
+  }
+
+  void try_at(const std::vector<Crossing>& few, CentredPose from, const Vec2& shift, double least) {
+    from.centre += shift;
+    const FitState state = polish(fields_, few, from, 12, &iterations_);
+    if (rough_log_likelihood(fields_, few, state) >= least) keep(state, false);
   }
 
   /// The near-symmetric images of the best pose, where the range admits them.
