@@ -47,6 +47,8 @@ constexpr double kAsDrawn = 0.5;
 constexpr double kAsDrawnOfTwo = 0.15;
 constexpr double kAsDrawnBetOfThree = 0.9;
 
+/// An answer so far behind the best changes no digit of a sum.
+constexpr double kNoDigit_nats = 45;
 /// A share too small to matter in any sum.
 constexpr double kNoShare = 1e-7;
 
@@ -171,11 +173,12 @@ std::vector<NormalEquations::Block> NormalEquations::blocks() const {
   return out;
 }
 
-std::vector<Solution> NormalEquations::solve_each(double k, const std::vector<bool>& free_members,
-                                                  const std::vector<double>& latencies_ms,
-                                                  const std::vector<Block>& blocks) const {
+std::vector<Solution> NormalEquations::solve_common(double k, const std::vector<bool>& free_members,
+                                                    const std::vector<double>& latencies_ms,
+                                                    const std::vector<Block>& blocks,
+                                                    std::vector<Eigen::Matrix3d>& posterior) const {
   Reduced seen;
-  std::vector<Eigen::Matrix3d> posterior(sums_.size());
+  posterior.resize(sums_.size());
   for (std::size_t m = 0; m < sums_.size(); ++m)
     seen += reduced(m, k, free_members[m], blocks[m], posterior[m]);
   std::vector<Solution> out;
@@ -188,20 +191,29 @@ std::vector<Solution> NormalEquations::solve_each(double k, const std::vector<bo
     one.covariance = factor.solve(CommonMatrix::Identity());
     one.log_evidence = evidence_of(total);
     one.members.resize(sums_.size());
-    for (std::size_t m = 0; m < sums_.size(); ++m) {
-      one.members[m].covariance = posterior[m];
-      if (!touches(m)) continue;
-      const Eigen::Matrix<double, 3, 5> carry = posterior[m] * blocks[m].cross;
-      one.members[m].shift = posterior[m] * blocks[m].right - carry * one.common;
-      one.members[m].covariance += carry * one.covariance * carry.transpose();
-    }
     out.push_back(std::move(one));
   }
   return out;
 }
 
+void NormalEquations::solve_members(const std::vector<Block>& blocks,
+                                    const std::vector<Eigen::Matrix3d>& posterior, Solution& solution) const {
+  for (std::size_t m = 0; m < sums_.size(); ++m) {
+    MemberSolution& member = solution.members[m];
+    member.covariance = posterior[m];
+    if (!touches(m)) continue;
+    const Eigen::Matrix<double, 3, 5> carry = posterior[m] * blocks[m].cross;
+    member.shift = posterior[m] * blocks[m].right - carry * solution.common;
+    member.covariance += carry * solution.covariance * carry.transpose();
+  }
+}
+
 Solution NormalEquations::solve(double k, const std::vector<bool>& free_members) const {
-  return std::move(solve_each(k, free_members, {priors_.latency_ms}, blocks()).front());
+  const std::vector<Block> all = blocks();
+  std::vector<Eigen::Matrix3d> posterior;
+  Solution out = std::move(solve_common(k, free_members, {priors_.latency_ms}, all, posterior).front());
+  solve_members(all, posterior, out);
+  return out;
 }
 
 struct NormalEquations::Scale {
@@ -227,11 +239,21 @@ std::vector<Weighed> NormalEquations::over_scales(const std::vector<bool>& free_
                                                   const std::vector<double>& latencies_ms) const {
   std::vector<Weighed> out;
   const std::vector<Block> all = blocks();
-  for (const Scale& scale : scales()) {
-    for (Solution& solution : solve_each(scale.k, free_members, latencies_ms, all)) {
+  const std::vector<Scale> each = scales();
+  std::vector<std::vector<Eigen::Matrix3d>> posteriors(each.size());
+  Weighed best{{}, -1e300, -1e300};
+  for (std::size_t i = 0; i < each.size(); ++i) {
+    for (Solution& solution : solve_common(each[i].k, free_members, latencies_ms, all, posteriors[i])) {
       const double evidence = solution.log_evidence;
-      out.push_back({std::move(solution), evidence + scale.log_weight, evidence + scale.log_bet});
+      out.push_back({std::move(solution), evidence + each[i].log_weight, evidence + each[i].log_bet});
+      best.log_weight = std::max(best.log_weight, out.back().log_weight);
+      best.log_bet = std::max(best.log_bet, out.back().log_bet);
     }
+  }
+  // The members of an answer too unlikely to change any digit are left where they are drawn.
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (out[i].log_weight > best.log_weight - kNoDigit_nats || out[i].log_bet > best.log_bet - kNoDigit_nats)
+      solve_members(all, posteriors[i / latencies_ms.size()], out[i].solution);
   }
   return out;
 }

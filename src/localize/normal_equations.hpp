@@ -94,10 +94,13 @@ class NormalEquations {
   Reduced common_prior(double latency_ms) const;
   std::vector<Block> blocks() const;
   double evidence_of(const Reduced& total) const;
-  /// One solution for each prior of the latency.
-  std::vector<Solution> solve_each(double k, const std::vector<bool>& free_members,
-                                   const std::vector<double>& latencies_ms,
-                                   const std::vector<Block>& blocks) const;
+  /// The common parameters of one scale for each prior of the latency, and what the members know beside them.
+  std::vector<Solution> solve_common(double k, const std::vector<bool>& free_members,
+                                     const std::vector<double>& latencies_ms,
+                                     const std::vector<Block>& blocks,
+                                     std::vector<Eigen::Matrix3d>& posterior) const;
+  void solve_members(const std::vector<Block>& blocks, const std::vector<Eigen::Matrix3d>& posterior,
+                     Solution& solution) const;
   std::vector<Scale> scales() const;
 
   std::vector<Vec2> centroids_;

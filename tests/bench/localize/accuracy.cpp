@@ -156,8 +156,8 @@ void latency(Book& book) {
       book.add(name + " success", t.share(t.success), "%", paper.share(paper.success), 100, Better::Higher);
       book.add(name + " RMS/CRLB", t.ratio(), "1", paper.judged > 0 ? paper.ratio() : NAN, NAN, Better::None);
       book.add(name + " NEES", t.mean_nees(), "1", 1, 1.5);
-      book.add(name + " latency error", 1e3 * std::sqrt(t.latency_square / t.judged), "ms", NAN,
-               spiral ? NAN : 0.2);
+      book.add(name + " latency error", 1e3 * std::sqrt(t.latency_square / t.judged), "ms",
+               1e3 * std::sqrt(t.latency_limit_square / t.judged), spiral ? NAN : 0.2);
     });
   }
 }

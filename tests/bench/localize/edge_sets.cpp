@@ -159,7 +159,7 @@ EdgeSet make_set(const OutlineTemplate& part, const Setting& setting, std::uint6
   return Scene(part, setting, seed).scan(path);
 }
 
-Eigen::Matrix3d bound(const OutlineTemplate& part, const Setting& setting, const EdgeSet& set) {
+Eigen::Matrix4d bound(const OutlineTemplate& part, const Setting& setting, const EdgeSet& set) {
   using Vector5 = Eigen::Matrix<double, 5, 1>;  // x, y, theta, latency ms, inset mm
   using Matrix5 = Eigen::Matrix<double, 5, 5>;
   const double weight = 1 / (setting.sigma_mm * setting.sigma_mm);
@@ -196,7 +196,7 @@ Eigen::Matrix3d bound(const OutlineTemplate& part, const Setting& setting, const
     inner.diagonal() += Eigen::Vector3d(1 / shift2, 1 / shift2, 1 / std::max(angle2, 1e-12));
     information -= cross[m].transpose() * inner.inverse() * cross[m];
   }
-  return Matrix5(information.inverse()).topLeftCorner<3, 3>();
+  return Matrix5(information.inverse()).topLeftCorner<4, 4>();
 }
 
 }  // namespace weldcell::bench

@@ -42,9 +42,9 @@ std::vector<PathPiece> raster(double radius_mm, double pitch_mm, double phase);
 /// One way over that disc, from the middle outwards, turns pitch_mm apart.
 std::vector<PathPiece> spiral(double radius_mm, double pitch_mm);
 
-/// Covariance of (x, y, theta) about the centroid, mm and rad, of generalized least squares over the true
-/// correspondences with the members' true variances (the Cramer-Rao bound when no member is off). Latency
-/// counts as unknown when it is not zero, the inset of round edges as known to 0.5 mm.
-Eigen::Matrix3d bound(const workpiece::OutlineTemplate& part, const Setting& setting, const EdgeSet& set);
+/// Covariance of (x, y, theta, latency) about the centroid, mm, rad and ms, of generalized least squares over
+/// the true correspondences with the members' true variances (the Cramer-Rao bound when no member is off).
+/// Latency counts as unknown when it is not zero, the inset of round edges as known to 0.5 mm.
+Eigen::Matrix4d bound(const workpiece::OutlineTemplate& part, const Setting& setting, const EdgeSet& set);
 
 }  // namespace weldcell::bench

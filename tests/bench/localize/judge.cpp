@@ -95,8 +95,8 @@ void judge(const workpiece::OutlineTemplate& outline, const Setting& setting, co
     ++tally.blunders["missed (" + found.cause + "), " + label];
     return;
   }
-  const Eigen::Matrix3d limit = bound(outline, setting, set);
-  const double square = e.cwiseAbs2().cwiseQuotient(limit.diagonal()).sum();
+  const Eigen::Vector4d limit = bound(outline, setting, set).diagonal();
+  const double square = e.cwiseAbs2().cwiseQuotient(limit.head<3>()).sum();
   tally.ratio_square += square;
   tally.ratio_fourth += square * square;
   for (int i = 0; i < 3; ++i) tally.error_square[static_cast<std::size_t>(i)] += e(i) * e(i);
@@ -104,6 +104,7 @@ void judge(const workpiece::OutlineTemplate& outline, const Setting& setting, co
   tally.nees += nees;
   tally.nees_square += nees * nees;
   if (found.latency_s) tally.latency_square += std::pow(*found.latency_s - setting.latency_s, 2);
+  tally.latency_limit_square += 1e-6 * limit(3);
   ++tally.judged;
 }
 

@@ -27,7 +27,8 @@ struct Tally {
   int trials = 0, success = 0, basin = 0, accepted = 0, false_accept = 0;
   int false_reject = 0, again = 0;  ///< good poses rejected, and asked for another scan
   int judged = 0;                   ///< trials inside the basin: only these count below
-  double ratio_square = 0, nees = 0, latency_square = 0;
+  double ratio_square = 0, nees = 0;
+  double latency_square = 0, latency_limit_square = 0;  ///< s2: errors, and their Cramer-Rao bound
   double ratio_fourth = 0, nees_square = 0;  ///< sums of squares of the two, for their standard errors
   std::array<double, 3> error_square{};      ///< x, y (mm2) and theta (rad2) at the centroid
   std::vector<double> ms;                    ///< CPU time of each trial
