@@ -21,7 +21,7 @@ using StageDone = std::function<void(Stage)>;
 
 /// Holds what does not depend on the scan (a few MB, built in milliseconds). localize() is const,
 /// deterministic and safe to call from several threads at once. At the same number of points 32 members take
-/// about twice, 100 about six times as long as 2 (bench localize, time).
+/// about three times, 100 about six times as long as 2 (bench localize, time).
 class Localizer {
  public:
   explicit Localizer(workpiece::OutlineTemplate outline);
