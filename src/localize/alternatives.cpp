@@ -17,6 +17,8 @@ constexpr double kSeenAt_mm = 5;
 constexpr double kMinAcross = 0.35;
 /// A joint of members that are a little off is closed to the beam all the same.
 constexpr double kClosed_mm = 2;
+/// A joint that stands open by less may hide its sides, from where the receiver looks across it.
+constexpr double kNarrow_mm = 6;
 /// Beam and noise decide nearer to the end of an edge.
 constexpr double kLeastEndMargin_mm = 1.5;
 /// A side tells nothing about a step against it, nor along it.
@@ -239,14 +241,24 @@ double Alternatives::whole() const {
 double Alternatives::gain(std::size_t member, const Polygon& instead, const Box2& within) const {
   Region region = inside(grown(within, kSeenAt_mm));
   region.end_margin_mm = kLeastEndMargin_mm;
-  // A point may lie on a side that a narrow slot shows; nobody has to have seen one there.
-  const auto nats = [&](const Variant& part) {
-    region.joint_gap_mm = kJointGap_mm;
-    const double explained = explained_nats(edges_within(part, region), region);
-    region.joint_gap_mm = kClosed_mm;
-    return explained - unseen_nats_ * unseen_on(edges_within(part, region), region);
+  struct Look {
+    double explained_nats;
+    int unseen, surely;  ///< crossings not seen; those that no narrow slot can have hidden
   };
-  return nats({member, &instead, bounds(instead)}) - nats({});
+  const auto look = [&](const Variant& part) {
+    const auto edges = [&](double joint_gap_mm) {
+      region.joint_gap_mm = joint_gap_mm;
+      return edges_within(part, region);
+    };
+    // A point may lie on a side that a narrow slot shows; nobody has to have seen one there.
+    return Look{explained_nats(edges(kJointGap_mm), region), unseen_on(edges(kClosed_mm), region),
+                unseen_on(edges(kNarrow_mm), region)};
+  };
+  const Look drawn = look({}), other = look({member, &instead, bounds(instead)});
+  // Slots that the drawing has as well hide as much in both.
+  const int hidden = drawn.unseen - drawn.surely;
+  const int unseen = other.surely + std::max(0, other.unseen - other.surely - hidden);
+  return other.explained_nats - drawn.explained_nats - unseen_nats_ * (unseen - drawn.surely);
 }
 
 double Alternatives::missing(int member) const {
