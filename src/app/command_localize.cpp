@@ -123,7 +123,8 @@ int run_one(const Job& job, const std::string& edges_path, const std::string& pa
     if (!read_text(path_path, &text) || !kept(files::parse_path(text, path_path), &path)) return 2;
   }
   const auto start = std::chrono::steady_clock::now();
-  const Localization found = job.localizer.localize(seen.edges, path, job.options);
+  const auto [found, heights] = localize::localize_leaning(job.localizer, seen.edges, seen.top_z_mm,
+                                                           seen.table_z_mm, path, job.options);
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
   std::vector<weld::WeldCertificate> certificates;
   // Without a pose and its covariance there is nothing to certify a weld by.
@@ -132,8 +133,6 @@ int run_one(const Job& job, const std::string& edges_path, const std::string& pa
   }
   nlohmann::json result =
       localize_json(job.localizer.outline(), job.options.planned, found, certificates, spent.count());
-  const localize::HeightFit heights =
-      localize::fit_heights(seen.edges, seen.top_z_mm, seen.table_z_mm, found.centroid_base);
   result["top"] = plane_json(heights.top);
   result["table"] = plane_json(heights.table);
   if (!file.empty()) result["file"] = file;

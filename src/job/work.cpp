@@ -191,9 +191,11 @@ Solution solve(const cell::CellSetup& cell, const JobInput& job, const Prepared&
   out.found = localizer.localize(draft.edges, draft.path, options);
   look.outline = outline_at(prepared.outline, out.found.pose);
   add(out.evidence, edges::detect(points, look));
-  out.found = localizer.localize(out.evidence.edges, out.evidence.path, options);
-  out.heights = localize::fit_heights(out.evidence.edges, out.evidence.top_z_mm, out.evidence.table_z_mm,
-                                      out.found.centroid_base, cell.laser.noise_mm);
+  localize::LeaningFit fit =
+      localize::localize_leaning(localizer, out.evidence.edges, out.evidence.top_z_mm,
+                                 out.evidence.table_z_mm, out.evidence.path, options, cell.laser.noise_mm);
+  out.found = std::move(fit.found);
+  out.heights = fit.heights;
 
   weld::CertifyOptions certify = certify_options(cell);
   if (out.heights.top) certify.top = weld::MeasuredTop{out.heights.reference, *out.heights.top};

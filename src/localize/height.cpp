@@ -13,6 +13,10 @@ constexpr std::size_t kMinHeights = 6;
 constexpr double kFirstScale_mm = 5;
 /// A slope beyond a few hundredths is no table; weak knowledge keeps a scan along one line solvable.
 constexpr double kSlopeSigma = 0.05;
+/// Leaning by less changes nothing.
+constexpr double kLeast_mm = 0.01;
+/// Of the shift that a lean makes, 1 sigma.
+constexpr double kUnknownShare = 0.25;
 
 struct Height {
   Eigen::Vector3d row;
@@ -76,6 +80,41 @@ HeightFit fit_heights(std::span<const EdgePoint> edges, std::span<const double> 
   const double sigma = std::isfinite(sigma_mm) ? std::clamp(sigma_mm, 0.005, 5.0) : 0.1;
   out.top = fit_plane(edges, top_z_mm, reference, sigma);
   out.table = fit_plane(edges, table_z_mm, reference, sigma);
+  return out;
+}
+
+std::vector<EdgePoint> upright(std::span<const EdgePoint> edges, const Localization& found,
+                               const workpiece::OutlineTemplate& outline, const TiltedPlane& top) {
+  std::vector<EdgePoint> out(edges.begin(), edges.end());
+  const Vec2 slope(top.slope_x, top.slope_y);
+  for (std::size_t i = 0; i < std::min(out.size(), found.edge_of_point.size()); ++i) {
+    if (found.edge_of_point[i] < 0 || out[i].shadowed) continue;
+    const workpiece::VisibleEdge& edge = outline.edges[static_cast<std::size_t>(found.edge_of_point[i])];
+    const Vec2 n = found.pose.rotate(edge.outward);
+    // From the part's upper outline outwards: where the wall begins, below a round edge, and its foot.
+    const double lean = outline.height_mm * n.dot(slope), begins = edge.radius_mm * n.dot(slope);
+    const double seen = lean > 0 ? (begins + lean) / 2 : begins;
+    out[i].x_mm -= seen * n.x();
+    out[i].y_mm -= seen * n.y();
+  }
+  return out;
+}
+
+LeaningFit localize_leaning(const Localizer& localizer, std::span<const EdgePoint> edges,
+                            std::span<const double> top_z_mm, std::span<const double> table_z_mm,
+                            std::span<const PathPiece> path, const LocalizeOptions& options,
+                            double sigma_mm) {
+  LeaningFit out;
+  out.found = localizer.localize(edges, path, options);
+  out.heights = fit_heights(edges, top_z_mm, table_z_mm, out.found.centroid_base, sigma_mm);
+  if (!out.heights.top) return out;
+  const TiltedPlane& top = *out.heights.top;
+  const double height_mm = localizer.outline().height_mm;
+  if (height_mm * std::hypot(top.slope_x, top.slope_y) < kLeast_mm) return out;
+  const Vec2 before = out.found.centroid_base;
+  out.found = localizer.localize(upright(edges, out.found, localizer.outline(), top), path, options);
+  const Vec2 unknown = kUnknownShare * (out.found.centroid_base - before);
+  if (unknown.allFinite()) out.found.covariance.topLeftCorner<2, 2>() += unknown * unknown.transpose();
   return out;
 }
 

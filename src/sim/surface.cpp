@@ -38,6 +38,7 @@ Surface::Surface(const Scene& scene, double reach_mm)
     if (signed_area(body.outline) < 0) std::reverse(body.outline.begin(), body.outline.end());
     body.box = bounds(body.outline);
     body.radius_mm = std::min(scene.workpiece.members[i].edge_radius_mm, height_mm_);
+    roundest_mm_ = std::max(roundest_mm_, body.radius_mm);
     const std::size_t n = body.outline.size();
     Vec2 longest = Vec2::Zero();
     for (std::size_t k = 0; k < n; ++k) {
@@ -134,8 +135,17 @@ double Surface::cast(const Eigen::Vector3d& from, const Eigen::Vector3d& directi
   if (above(top) <= 1e-9) return top;
   const double at_table = height(from.x() + table * direction.x(), from.y() + table * direction.y());
   if (at_table <= 0 && std::abs(above((top + table) / 2) - height_mm_ / 2) < 1e-9) return table;
-  // Between the planes: a round edge, or a side wall met by a tilted beam.
+  // Between the planes: a round edge, or a side wall met by a tilted beam. One that leaves the outline
+  // downwards meets the round edge or passes it and then meets nothing, so that each is looked for by itself.
+  const double walls = top + roundest_mm_ / -direction.z();
   double free = top, blocked = table;
+  if (above(walls) <= 0) {
+    blocked = walls;
+  } else if (at_table <= 0) {
+    return table;
+  } else {
+    free = walls;
+  }
   for (int i = 0; i < 24; ++i) {
     const double middle = 0.5 * (free + blocked);
     (above(middle) > 0 ? free : blocked) = middle;

@@ -50,6 +50,7 @@ class Surface {
   Around classify(const Vec2& center) const;
 
   double table_mm_, height_mm_, reach_mm_;
+  double roundest_mm_ = 0;  ///< largest radius of an edge
   std::vector<Body> bodies_;
   Box2 area_;
   std::size_t columns_ = 0, rows_ = 0;

@@ -166,6 +166,7 @@ Result<OutlineTemplate> build_template(const Workpiece& workpiece, double joint_
       const auto side = static_cast<std::size_t>(edge.side);
       edge.round = workpiece.members[i].edge_radius_mm > 0 &&
                    (outline[(side + 1) % outline.size()] - outline[side]).norm() >= long_side;
+      if (edge.round) edge.radius_mm = std::min(workpiece.members[i].edge_radius_mm, workpiece.height_mm);
       out.edges.push_back(edge);
     }
   }

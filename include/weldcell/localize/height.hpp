@@ -4,9 +4,11 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "weldcell/geometry/edge_point.hpp"
 #include "weldcell/geometry/plane.hpp"
+#include "weldcell/localize/localizer.hpp"
 
 namespace weldcell::localize {
 
@@ -34,5 +36,29 @@ struct HeightFit {
 /// wrong.
 HeightFit fit_heights(std::span<const EdgePoint> edges, std::span<const double> top_z_mm,
                       std::span<const double> table_z_mm, const Vec2& reference, double sigma_mm = 0.1);
+
+/// Where steps of a part that stands square to its tilted top would be seen if it stood upright, its top
+/// staying where it is; frame Base. The beam falls along Base z. With outward normal n of the edge, slope g
+/// of the top, height h and edge radius r, the foot stands out from the upper outline by h n.g, the end of
+/// the round edge by r n.g. Where n.g < 0 the top overhangs and the step is at the end of its round edge;
+/// where n.g > 0 the wall shows beside the top, grazed and dark, and the step is seen half-way along it.
+/// Steps that the receiver sees beside a shadow end with the top and stay, as do those that belong to no edge
+/// of the found pose. `found` is of the same edges, in the same order.
+std::vector<EdgePoint> upright(std::span<const EdgePoint> edges, const Localization& found,
+                               const workpiece::OutlineTemplate& outline, const TiltedPlane& top);
+
+/// A part found twice: as it is seen, and with its lean taken out where that matters.
+struct LeaningFit {
+  Localization found;
+  HeightFit heights;
+};
+
+/// The localization, and again of upright() edges where the walls lean by more than 0.01 mm. The covariance
+/// then holds what is not known of the lean: a quarter of the shift that was taken out, since a round edge
+/// shows less of its wall and a bright wall more.
+LeaningFit localize_leaning(const Localizer& localizer, std::span<const EdgePoint> edges,
+                            std::span<const double> top_z_mm, std::span<const double> table_z_mm,
+                            std::span<const PathPiece> path, const LocalizeOptions& options,
+                            double sigma_mm = 0.1);
 
 }  // namespace weldcell::localize

@@ -13,11 +13,12 @@ namespace weldcell::workpiece {
 
 /// A height step on the boundary of the union of all members. Frame Part, mm.
 struct VisibleEdge {
-  Segment line;        ///< material to the left of a -> b
-  Vec2 outward;        ///< unit normal, from material to table
-  int member = -1;     ///< index into Workpiece::members
-  int side = -1;       ///< index of the outline side (vertex i -> i+1) of that member
-  bool round = false;  ///< the member's round top edge runs along it
+  Segment line;          ///< material to the left of a -> b
+  Vec2 outward;          ///< unit normal, from material to table
+  int member = -1;       ///< index into Workpiece::members
+  int side = -1;         ///< index of the outline side (vertex i -> i+1) of that member
+  bool round = false;    ///< the member's round top edge runs along it
+  double radius_mm = 0;  ///< of that edge
 };
 
 /// Symmetry or near-symmetry of the outline under a rotation about the centroid (plus the shift that fits

@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include "line_scan.hpp"
+#include "weldcell/base/units.hpp"
 
 namespace weldcell::localize {
 namespace {
@@ -45,6 +49,93 @@ TEST(Height, TooFewHeightsGiveNoPlane) {
   const HeightFit fit = fit_heights(edges, z, {}, Vec2::Zero());
   EXPECT_FALSE(fit.top);
   EXPECT_FALSE(fit.table);
+}
+
+/// A frame of bars, 60 high, turned with its table about a place in the plane of its top. Where a beam along
+/// Base z steps down from an edge of it: half-way between the last of the top and the first of the table.
+class Leaning {
+ public:
+  Leaning(const Vec2& pivot, double roll_rad, double pitch_rad)
+      : pivot_(pivot.x(), pivot.y(), kHeight_mm),
+        turn_(Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitY()) *
+              Eigen::AngleAxisd(roll_rad, Eigen::Vector3d::UnitX())) {}
+
+  static constexpr double kHeight_mm = 60;
+
+  Eigen::Vector3d turned(const Vec2& at, double z) const {
+    return pivot_ + turn_ * (Eigen::Vector3d(at.x(), at.y(), z) - pivot_);
+  }
+  Vec2 step(const Vec2& on_edge, const Vec2& outward) const {
+    const Vec2 top = turned(on_edge, kHeight_mm).head<2>(), foot = turned(on_edge, 0).head<2>();
+    const double wall = (foot - top).dot(outward);
+    return top + std::max(0.0, wall) / 2 * outward;
+  }
+
+ private:
+  Eigen::Vector3d pivot_;
+  Eigen::Matrix3d turn_;
+};
+
+TEST(Height, ALeaningPartIsFoundWhereItsTopLies) {
+  workpiece::Workpiece w;
+  w.name = "frame";
+  w.height_mm = Leaning::kHeight_mm;
+  w.members = {box("low", {0, 0}, {700, 50}), box("high", {0, 450}, {700, 500}),
+               box("left", {100, 50}, {150, 450}), box("right", {500, 50}, {550, 450})};
+  const auto part = workpiece::build_template(*workpiece::validated(std::move(w)));
+  ASSERT_TRUE(part.ok());
+  const Localizer localizer(*part);
+  const Pose2 truth{4, -3, rad(0.4)};
+  for (const auto& [roll, pitch] : {std::pair{0.3, 0.0}, {0.0, -0.3}, {-0.25, 0.2}, {0.0, 0.0}}) {
+    SCOPED_TRACE(testing::Message() << "roll " << roll << " pitch " << pitch);
+    const Leaning leaning(truth * part->centroid, rad(roll), rad(pitch));
+    std::vector<EdgePoint> edges;
+    std::vector<double> top_z, table_z;
+    for (const workpiece::VisibleEdge& e : part->edges) {
+      const Vec2 n = truth.rotate(e.outward);
+      for (double at = 15; at < e.line.length() - 10; at += 35) {
+        const Vec2 on_edge = truth * Vec2(e.line.a + at * e.line.direction());
+        const Vec2 seen = leaning.step(on_edge, n);
+        edges.push_back({seen.x(), seen.y(), n.x(), n.y(), -1, 0.05, 200, false});
+        top_z.push_back(leaning.turned(on_edge, Leaning::kHeight_mm).z());
+        table_z.push_back(leaning.turned(on_edge, 0).z());
+      }
+    }
+    const Localization as_seen = localizer.localize(edges, {}, {});
+    const LeaningFit fit = localize_leaning(localizer, edges, top_z, table_z, {}, {});
+    const Vec2 there = truth * part->centroid;
+    const double lean = Leaning::kHeight_mm * std::hypot(rad(roll), rad(pitch));
+    // A quarter of the lean: half of the wall's width at one side of every member, nothing at the other.
+    EXPECT_NEAR((as_seen.centroid_base - there).norm(), lean / 4, 0.02 * lean + 1e-3);
+    EXPECT_LT((fit.found.centroid_base - there).norm(), 0.02 * lean + 1e-3);
+    EXPECT_EQ(fit.found.verdict, Verdict::Weld) << fit.found.reason;
+    EXPECT_GE(fit.found.covariance(0, 0) + 1e-12, as_seen.covariance(0, 0) * 0.5);
+    ASSERT_TRUE(fit.heights.top.has_value());
+    EXPECT_NEAR(fit.heights.top->slope_y, std::tan(rad(roll)), 1e-4);
+  }
+}
+
+TEST(Height, AShadowedStepAndAStrayPointStayWhereTheyAre) {
+  workpiece::Workpiece w;
+  w.name = "bar";
+  w.height_mm = 40;
+  w.members = {box("bar", {0, 0}, {300, 50})};
+  const auto part = workpiece::build_template(*workpiece::validated(std::move(w)));
+  ASSERT_TRUE(part.ok());
+  int top_side = -1, low_side = -1;
+  for (std::size_t e = 0; e < part->edges.size(); ++e) {
+    if (part->edges[e].outward.y() > 0.9) top_side = static_cast<int>(e);
+    if (part->edges[e].outward.y() < -0.9) low_side = static_cast<int>(e);
+  }
+  TiltedPlane top;
+  top.slope_y = 0.005;
+  Localization found;
+  found.edge_of_point = {top_side, low_side, top_side, -1};
+  std::vector<EdgePoint> edges(4, EdgePoint{100, 50, 0, 1, -1, 0.05, 200, false});
+  edges[2].shadowed = true;
+  const std::vector<EdgePoint> out = upright(edges, found, *part, top);
+  EXPECT_NEAR(out[0].y_mm, 50 - 40 * 0.005 / 2, 1e-9) << "the wall shows";
+  for (const std::size_t same : {1, 2, 3}) EXPECT_NEAR(out[same].y_mm, 50, 1e-9) << same;
 }
 
 }  // namespace
