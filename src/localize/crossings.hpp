@@ -21,7 +21,8 @@ struct Crossing {
 
 struct Crossings {
   std::vector<Crossing> list;
-  int broken = 0;  ///< points that were no numbers
+  int broken = 0;           ///< points that were no numbers
+  std::vector<bool> stray;  ///< one per edge point: off the path of the scan; empty when none is
 };
 
 /// Points that are not finite, or beyond kFarthest_mm, are dropped and counted; a point that stands twice

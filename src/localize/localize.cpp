@@ -11,6 +11,7 @@
 #include "paper.hpp"
 #include "search.hpp"
 #include "solver.hpp"
+#include "strays.hpp"
 #include "weldcell/base/units.hpp"
 #include "weldcell/localize/localizer.hpp"
 
@@ -20,6 +21,28 @@ namespace {
 
 constexpr std::size_t kMinPoints = 6;
 constexpr std::size_t kMaxFitPoints = 6000;
+/// With fewer of its points on the path, that is the path of another scan.
+constexpr double kLeastOnPath = 0.3;
+
+/// Points from which no pose can be had, however they fit.
+std::optional<Localization> too_little(const std::vector<Crossing>& crossings, std::size_t points) {
+  if (crossings.size() < kMinPoints) {
+    return refused(
+        Verdict::Rescan, "too_few_points",
+        fmt::format("Too few different edge points were seen: {} of at least {}. Check that the part lies "
+                    "under the scan and scan again.",
+                    crossings.size(), kMinPoints),
+        points);
+  }
+  if (on_one_line(crossings)) {
+    return refused(Verdict::Rescan, "one_line",
+                   fmt::format("All {} edge points lie on one straight line, which leaves the place along it "
+                               "open. Scan across other sides of the part too.",
+                               crossings.size()),
+                   points);
+  }
+  return std::nullopt;
+}
 
 }  // namespace
 
@@ -57,21 +80,7 @@ Localization Localizer::localize(std::span<const EdgePoint> edges, std::span<con
                        " edge points are no numbers. Check the sensor and scan again.",
                    edges.size());
   }
-  if (crossings.list.size() < kMinPoints) {
-    return refused(
-        Verdict::Rescan, "too_few_points",
-        fmt::format("Too few different edge points were seen: {} of at least {}. Check that the part lies "
-                    "under the scan and scan again.",
-                    crossings.list.size(), kMinPoints),
-        edges.size());
-  }
-  if (on_one_line(crossings.list)) {
-    return refused(Verdict::Rescan, "one_line",
-                   fmt::format("All {} edge points lie on one straight line, which leaves the place along it "
-                               "open. Scan across other sides of the part too.",
-                               crossings.list.size()),
-                   edges.size());
-  }
+  if (auto little = too_little(crossings.list, edges.size())) return *std::move(little);
   // A path that cannot be trusted would take its negative evidence along without a word.
   std::vector<PathPiece> sound_path;
   if (const auto broken = std::count_if(path.begin(), path.end(), std::not_fn(sound)); broken > 0) {
@@ -86,11 +95,23 @@ Localization Localizer::localize(std::span<const EdgePoint> edges, std::span<con
     path = sound_path;
   }
   if (crossings.list.size() > kMaxFitPoints) crossings.list = sampled(crossings.list, kMaxFitPoints);
+  if (options.method == Method::Robust && !path.empty()) {
+    const std::size_t ready = crossings.list.size();
+    drop_strays(path, edges.size(), crossings);
+    if (static_cast<double>(crossings.list.size()) < kLeastOnPath * static_cast<double>(ready)) {
+      return refused(Verdict::Reject, "bad_path",
+                     fmt::format("{} of {} edge points do not lie on the scan path: the path is of another "
+                                 "scan, or in another frame. Give the path of this scan.",
+                                 ready - crossings.list.size(), ready),
+                     edges.size());
+    }
+    if (auto little = too_little(crossings.list, edges.size())) return *std::move(little);
+  }
   if (options.method == Method::Paper) {
     return paper::localize(*outline_, crossings.list, edges.size(), options);
   }
   Localization result;
-  if (!solve_robust(*outline_, *fields_, crossings.list, edges, path, options, done, result)) {
+  if (!solve_robust(*outline_, *fields_, crossings, edges, path, options, done, result)) {
     return refused(
         Verdict::Reject, "no_fit",
         "No place within the allowed range fits the edge points. Check that the right part lies there.",

@@ -50,12 +50,12 @@ struct Candidate {
 /// One run of the robust method over ready crossings.
 class Solver {
  public:
-  Solver(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
-         const std::vector<Crossing>& crossings, std::span<const PathPiece> path,
-         const LocalizeOptions& options, const StageDone& done)
+  Solver(const workpiece::OutlineTemplate& outline, const TemplateFields& fields, const Crossings& crossings,
+         std::span<const PathPiece> path, const LocalizeOptions& options, const StageDone& done)
       : outline_(outline),
         fields_(fields),
-        crossings_(crossings),
+        crossings_(crossings.list),
+        stray_(crossings.stray),
         path_(path),
         options_(options),
         done_(done) {
@@ -298,7 +298,7 @@ class Solver {
     const double c = std::cos(result.pose.theta_rad), s = std::sin(result.pose.theta_rad);
     for (std::size_t i = 0; i < edges.size(); ++i) {
       const Crossings one = ready_crossings(edges.subspan(i, 1), options_.default_sigma_mm);
-      if (one.list.empty()) continue;
+      if (one.list.empty() || (!stray_.empty() && stray_[i])) continue;
       const Match m = match(fields_, one.list.front(), fit_.state.pose, c, s);
       if (m.edge < 0) continue;
       result.residual_mm[i] = m.residual_mm;
@@ -332,6 +332,7 @@ class Solver {
   const workpiece::OutlineTemplate& outline_;
   const TemplateFields& fields_;
   const std::vector<Crossing>& crossings_;
+  const std::vector<bool>& stray_;
   std::span<const PathPiece> path_;
   const LocalizeOptions& options_;
   const StageDone& done_;
@@ -349,7 +350,7 @@ class Solver {
 }  // namespace
 
 bool solve_robust(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
-                  const std::vector<Crossing>& crossings, std::span<const EdgePoint> edges,
+                  const Crossings& crossings, std::span<const EdgePoint> edges,
                   std::span<const PathPiece> path, const LocalizeOptions& options, const StageDone& done,
                   Localization& result) {
   return Solver(outline, fields, crossings, path, options, done).run(edges, result);

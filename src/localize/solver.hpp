@@ -13,7 +13,7 @@ namespace weldcell::localize {
 /// Fills the result and its verdict. `edges` are the points as given, `crossings` what is usable of them.
 /// False when no pose of the range brings a single point near an edge.
 bool solve_robust(const workpiece::OutlineTemplate& outline, const TemplateFields& fields,
-                  const std::vector<Crossing>& crossings, std::span<const EdgePoint> edges,
+                  const Crossings& crossings, std::span<const EdgePoint> edges,
                   std::span<const PathPiece> path, const LocalizeOptions& options, const StageDone& done,
                   Localization& result);
 

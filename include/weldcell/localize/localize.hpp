@@ -75,7 +75,8 @@ struct Localization {
   Vec2 centroid_base = Vec2::Zero();  ///< template's centroid in Base, where the covariance holds
   double mean_error_mm = 0;           ///< mean distance of all points to the outline (the paper's figure)
   int points = 0, inliers = 0;
-  std::vector<int> edge_of_point;   ///< index into the template's edges, -1 = outlier; one per point
+  std::vector<int>
+      edge_of_point;  ///< index into the template's edges, -1 = outlier or off the path; one per point
   std::vector<double> residual_mm;  ///< signed distance to that edge along its outward normal; one per point
   std::optional<double> latency_s;  ///< residual latency found, when estimated
   double inset_mm = 0;

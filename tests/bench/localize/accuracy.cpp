@@ -21,10 +21,18 @@ std::vector<Case> accuracy_cases() {
   out10.outliers = 0.1;
   out10.sigma_mm = 0.4;
   out30.outliers = 0.3;
+  Setting out10_on = out10, out30_on = out30;
+  out10_on.strays_on_path = out30_on.strays_on_path = true;
   var05.member_mm = 0.5, var05.member_deg = 0.125;
   var1.member_mm = 1, var1.member_deg = 0.25;
-  return {{"out0", out0, 1.15},   {"base", base, 1.15},   {"out10", out10, 1.15},
-          {"out30", out30, 1.10}, {"var05", var05, 1.10}, {"var1", var1, 1.10}};
+  return {{"out0", out0, 1.15},
+          {"base", base, 1.15},
+          {"out10", out10, 1.15},
+          {"out30", out30, 1.10},
+          {"out10 on the path", out10_on, 1.15},
+          {"out30 on the path", out30_on, 1.10},
+          {"var05", var05, 1.10},
+          {"var1", var1, 1.10}};
 }
 
 /// Round edges are seen inside the outline, by how much depends on the laser.
@@ -106,13 +114,14 @@ void extreme_cell(Book& book, const PartUnderTest& part, std::uint64_t seed) {
   book.add(name + " time median", t.milliseconds(0.5), "ms", NAN, 15);
 }
 
-void hard_cell(Book& book, const PartUnderTest& part, std::uint64_t seed) {
-  const std::string name = "hard " + part.workpiece.name;
+void hard_cell(Book& book, const PartUnderTest& part, std::uint64_t seed, bool strays_on_path) {
+  const std::string name = std::string(strays_on_path ? "hard on the path " : "hard ") + part.workpiece.name;
   // Three members less the missing one leave a direction that nothing measures.
   if (!book.wanted(name) || part.workpiece.members.size() <= 3) return;
   Setting hard = on_part({}, part);
   hard.sigma_mm = 0.4, hard.outliers = 0.3, hard.pitch_mm = 100, hard.drop_out = 0.2;
   hard.members_missing = 1, hard.member_mm = 0.5, hard.member_deg = 0.125, hard.shift_mm = 50;
+  hard.strays_on_path = strays_on_path;
   const Tally t = run_cell(part, hard, book.options.trials, seed, solver_of(part, hard));
   book.explain(name, t);
   book.add(name + " basin", t.share(t.basin), "%", 96, 99.5, Better::Higher);
@@ -137,7 +146,7 @@ void basin(Book& book) {
   book.each_part([&](const PartUnderTest& part, std::uint64_t seed) {
     wide_cell(book, part, seed);
     extreme_cell(book, part, seed);
-    hard_cell(book, part, seed);
+    for (const bool strays_on_path : {false, true}) hard_cell(book, part, seed, strays_on_path);
   });
 }
 

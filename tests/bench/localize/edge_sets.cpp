@@ -99,11 +99,28 @@ class Scene {
   void clutter(double radius) {
     const auto count = static_cast<int>(
         std::lround(static_cast<double>(set_.edges.size()) * setting_.outliers / (1 - setting_.outliers)));
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; setting_.strays_on_path && i < count; ++i) clutter_on_path();
+    for (int i = 0; !setting_.strays_on_path && i < count; ++i) {
       const double r = radius * std::sqrt(uniform_(random_)), a = 2 * kPi * uniform_(random_);
       const PathPiece& piece = set_.path[random_() % set_.path.size()];
       const Vec2 travel = Vec2(piece.x1_mm - piece.x0_mm, piece.y1_mm - piece.y0_mm).normalized();
       add(middle_ + r * Vec2(std::cos(a), std::sin(a)), travel, uniform_(random_) < 0.5 ? 1 : -1, -1);
+    }
+  }
+
+  void clutter_on_path() {
+    double length = 0;
+    for (const PathPiece& p : set_.path) length += std::hypot(p.x1_mm - p.x0_mm, p.y1_mm - p.y0_mm);
+    double left = length * uniform_(random_);
+    for (const PathPiece& p : set_.path) {
+      const Vec2 by(p.x1_mm - p.x0_mm, p.y1_mm - p.y0_mm);
+      if (left > by.norm()) {
+        left -= by.norm();
+        continue;
+      }
+      add(Vec2(p.x0_mm, p.y0_mm) + left * by.normalized(), by.normalized(), uniform_(random_) < 0.5 ? 1 : -1,
+          -1);
+      return;
     }
   }
 

@@ -20,6 +20,9 @@ struct Setting {
   int members_missing = 0;
   double member_mm = 0, member_deg = 0;
   double shift_mm = 15, turn_deg = 20;
+  /// Stray steps lie where the beam passed, as a real scan's do; else anywhere on the table, as the
+  /// development sets' do.
+  bool strays_on_path = false;
   double inset_mm = 0;  ///< round edges are seen this far inside the outline
   bool spiral = false;
 };
