@@ -12,7 +12,8 @@ constexpr const char* kUsage =
     "usage: bench_localize [--json] [--trials N] [--quick] [--seed S] [--only WORD] [--rows FILE]\n"
     "  --trials N    scans a cell (default 300); the paper's method gets 12, a wrong part at most 100\n"
     "  --quick       30 scans a cell, 2 for the paper's method\n"
-    "  --only WORD   cells whose name holds WORD: base, extreme, mirrored, tee, proof, joint gap, pcl, "
+    "  --only WORD   cells whose name holds WORD: base, extreme, mirrored, tee, random, proof, joint gap, "
+    "pcl, "
     "paper table, frontier, time;\n"
     "                may be given more than once\n"
     "  --rows FILE   also write the rows to FILE as JSON (scripts/bench localize --svg FILE draws them)\n"
@@ -68,6 +69,7 @@ int main(int argc, char** argv) {
   weldcell::bench::latency(book);
   weldcell::bench::wrong_parts(book);
   weldcell::bench::proof(book);
+  weldcell::bench::random_weldments(book);
   weldcell::bench::members(book);
   weldcell::bench::peers(book);
   weldcell::bench::paper_table(book);

@@ -45,15 +45,16 @@ class Book {
 };
 
 // The sections; each adds its rows and leaves out cells that are not wanted.
-void accuracy(Book& book);     // RMS against the bound, NEES, wrong verdicts
-void frontier(Book& book);     // what any rule can reach with two members
-void basin(Book& book);        // wide and extreme placements, the hard set
-void latency(Book& book);      // 8 ms between robot and sensor
-void wrong_parts(Book& book);  // mirrored, moved, missing, swapped, lengthened, turned
-void proof(Book& book);        // what a scan did not look at, and the lines that mend it
-void members(Book& book);      // members off the drawing, gaps of joints
-void peers(Book& book);        // the Point Cloud Library's ICP on the same scans
-void paper_table(Book& book);  // the paper's Table 1, its method and ours on the same scans
-void speed(Book& book);        // points, members, threads, against the paper's method
+void accuracy(Book& book);          // RMS against the bound, NEES, wrong verdicts
+void frontier(Book& book);          // what any rule can reach with two members
+void basin(Book& book);             // wide and extreme placements, the hard set
+void latency(Book& book);           // 8 ms between robot and sensor
+void wrong_parts(Book& book);       // mirrored, moved, missing, swapped, lengthened, turned
+void proof(Book& book);             // what a scan did not look at, and the lines that mend it
+void random_weldments(Book& book);  // a new weldment for every trial
+void members(Book& book);           // members off the drawing, gaps of joints
+void peers(Book& book);             // the Point Cloud Library's ICP on the same scans
+void paper_table(Book& book);       // the paper's Table 1, its method and ours on the same scans
+void speed(Book& book);             // points, members, threads, against the paper's method
 
 }  // namespace weldcell::bench
