@@ -21,6 +21,9 @@ constexpr std::size_t kModes = 8;
 constexpr double kFarBehind_nats = 40;
 /// Steps along members that stand side by side, where few points tell how far along.
 constexpr double kSlide_mm = 15;
+/// A pose this far beyond the range may still lie in it.
+constexpr double kOnTheLimit_mm = 1;
+constexpr double kOnTheLimit_rad = rad(0.1);
 /// A millisecond that looks like so much turn at the farthest point is told apart from it by little.
 constexpr double kCoupled_mm_per_ms = 0.05;
 /// At least two points, so that no stray one alone tells which of two members is off.
@@ -99,10 +102,12 @@ class Solver {
     if (!fields_.slips().empty()) few = sampled_both_ways(medium_, kSearchPoints);
     end(Stage::Search);
     for (const Mode& mode : modes) {
-      if (!candidates_.empty() && mode.score < 0.5 * best_score_) break;
-      best_score_ = std::max(best_score_, mode.score);
+      if (!candidates_.empty() && mode.score < 0.5 * modes.front().score) break;
       consider(few, mode.pose, false);
     }
+    // What drifts out of the range is looked at all the same: something lies there, and has a name.
+    if (candidates_.empty() && !modes.empty())
+      keep(polish(fields_, few, modes.front().pose, 12, &iterations_), false, true);
     if (candidates_.empty()) return;
     order();
     add_slipped(few);
@@ -117,9 +122,9 @@ class Solver {
     keep(polish(fields_, few, from, turned ? 6 : 12, &iterations_), turned);
   }
 
-  void keep(const FitState& state, bool turned) {
+  void keep(const FitState& state, bool turned, bool outside_too = false) {
     Candidate candidate{state, 0, turned};
-    if (!box_.holds(candidate.state.pose, 12, rad(1.5))) return;
+    if (!outside_too && !box_.holds(candidate.state.pose, 12, rad(1.5))) return;
     for (const Candidate& other : candidates_) {
       if (same_place(fields_, other.state.pose, candidate.state.pose)) return;
     }
@@ -165,17 +170,22 @@ class Solver {
     }
   }
 
-  /// Of the images under true symmetries, which no scan can tell apart, the one least turned from planned.
+  /// Of the images under true symmetries, which no scan can tell apart, one that lies in the range, and of
+  /// these the one least turned from planned.
   void prefer_planned_turn() {
     const Pose2 best = part_pose(outline_, candidates_.front().state.pose);
     CentredPose& chosen = candidates_.front().state.pose;
-    const auto turn = [&](const CentredPose& p) {
-      return std::abs(wrap_pi(p.theta_rad - box_.planned.theta_rad));
+    const auto before = [&](const CentredPose& a, const CentredPose& b) {
+      const bool a_held = box_.holds(a, kOnTheLimit_mm, kOnTheLimit_rad),
+                 b_held = box_.holds(b, kOnTheLimit_mm, kOnTheLimit_rad);
+      if (a_held != b_held) return a_held;
+      return std::abs(wrap_pi(a.theta_rad - box_.planned.theta_rad)) <
+             std::abs(wrap_pi(b.theta_rad - box_.planned.theta_rad)) - 1e-6;
     };
     for (const workpiece::Symmetry& symmetry : outline_.symmetries) {
       if (symmetry.gap_mm != 0) continue;
       const CentredPose image = centred_pose(outline_, best * symmetry.map);
-      if (turn(image) < turn(chosen) - 1e-6) chosen = image;
+      if (before(image, chosen)) chosen = image;
     }
   }
 
@@ -339,7 +349,6 @@ class Solver {
   SearchBox box_;
   Priors priors_;
   std::vector<Crossing> medium_;  ///< at most 400, evenly
-  double best_score_ = 0;
   int iterations_ = 0;
   std::vector<Candidate> candidates_;
   Fit fit_;
