@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -91,9 +92,13 @@ FitState polish(const TemplateFields& fields, const std::vector<Crossing>& cross
 double rough_log_likelihood(const TemplateFields& fields, const std::vector<Crossing>& crossings,
                             const FitState& state);
 
+/// A rough start is right to some millimetres, members included; a close one to about a millimetre, so that
+/// wide weights and members would only lead away from it.
+enum class Start : std::uint8_t { Rough, Close };
+
 /// The full estimate from a polished state.
 Fit refine(const TemplateFields& fields, const std::vector<Crossing>& crossings, const FitState& start,
-           const Priors& priors);
+           const Priors& priors, Start nearness = Start::Rough);
 
 /// Takes one estimate for the fit's own and matches the crossings anew; both must explain the points alike.
 void settle_on(const TemplateFields& fields, const std::vector<Crossing>& crossings, const Estimate& estimate,

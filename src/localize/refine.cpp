@@ -27,10 +27,11 @@ constexpr std::size_t kSettlePoints = 600;
 class Refinement {
  public:
   Refinement(const TemplateFields& fields, const std::vector<Crossing>& crossings, const FitState& start,
-             const Priors& priors)
+             const Priors& priors, Start nearness)
       : fields_(fields),
         crossings_(crossings),
         priors_(priors),
+        start_(nearness),
         free_(fields.member_centroids().size(), false),
         rows_(crossings.size()) {
     fit_.state = start;
@@ -107,10 +108,13 @@ class Refinement {
   void find_members() {
     Priors wide = priors_;
     wide.latency_ms = priors_.latency_ms > 0 ? kWideLatency_ms : 0;
-    wide.member_shift_mm = 2;
-    wide.member_angle_rad = 0.01;
+    if (start_ == Start::Rough) {
+      wide.member_shift_mm = 2;
+      wide.member_angle_rad = 0.01;
+    }
     NormalEquations equations(fields_.member_centroids(), wide);
     for (const double scale : {5.0, 3.0, 2.0}) {
+      if (start_ == Start::Close && scale > 2) continue;
       place();
       equations.clear();
       weigh_geman_mcclure(equations, scale);
@@ -337,6 +341,7 @@ class Refinement {
   const TemplateFields& fields_;
   const std::vector<Crossing>& crossings_;
   Priors priors_;
+  Start start_;
   std::vector<bool> free_;
   std::vector<Row> rows_;
   Fit fit_;
@@ -345,13 +350,13 @@ class Refinement {
 }  // namespace
 
 Fit refine(const TemplateFields& fields, const std::vector<Crossing>& crossings, const FitState& start,
-           const Priors& priors) {
-  Refinement all(fields, crossings, start, priors);
+           const Priors& priors, Start nearness) {
+  Refinement all(fields, crossings, start, priors, nearness);
   if (crossings.size() <= kSettlePoints) {
     all.settle();
   } else {
     const std::vector<Crossing> even = sampled(crossings, kSettlePoints);
-    Refinement coarse(fields, even, start, priors);
+    Refinement coarse(fields, even, start, priors, nearness);
     coarse.settle();
     all.adopt(coarse);
   }

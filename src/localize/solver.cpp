@@ -24,6 +24,8 @@ constexpr double kSlide_mm = 15;
 /// A pose this far beyond the range may still lie in it.
 constexpr double kOnTheLimit_mm = 1;
 constexpr double kOnTheLimit_rad = rad(0.1);
+/// Members within their tolerances lead a fit less far from where it started.
+constexpr double kLeft_mm = 3;
 /// A millisecond that looks like so much turn at the farthest point is told apart from it by little.
 constexpr double kCoupled_mm_per_ms = 0.05;
 /// At least two points, so that no stray one alone tells which of two members is off.
@@ -76,8 +78,7 @@ class Solver {
     collect_candidates();
     end(Stage::Polish);
     if (candidates_.empty()) return false;
-    fit_ = refine(fields_, crossings_,
-                  polish(fields_, medium_, candidates_.front().state.pose, 4, &iterations_), priors_);
+    fit_ = refined(candidates_.front().state.pose);
     try_other_latencies();
     end(Stage::Refine);
     evidence_ = gather_evidence(fields_, path_, fit_);
@@ -198,6 +199,22 @@ class Solver {
         });
   }
 
+  /// Polished and refined. A fit that has left the polished pose has followed a member, or clutter in place
+  /// of one; it stands only when points and travel prefer it to the fit that stayed.
+  Fit refined(const CentredPose& pose) {
+    const FitState polished = polish(fields_, medium_, pose, 4, &iterations_);
+    Fit fit = refine(fields_, crossings_, polished, priors_);
+    const double turned = std::abs(wrap_pi(fit.state.pose.theta_rad - polished.pose.theta_rad));
+    const double left = (fit.state.pose.centre - polished.pose.centre).norm() + turned * fields_.radius_mm();
+    if (left < kLeft_mm) return fit;
+    Fit stayed = refine(fields_, crossings_, polished, priors_, Start::Close);
+    return weight(stayed) > weight(fit) ? stayed : fit;
+  }
+
+  double weight(const Fit& fit) const {
+    return fit.log_likelihood + path_log_likelihood(gather_evidence(fields_, path_, fit));
+  }
+
   /// Where the scan went one way only, a turn and a latency look alike, and the fit may have settled on a far
   /// pair of them: others along that direction are tried as starts.
   void try_other_latencies() {
@@ -215,7 +232,7 @@ class Solver {
       start.pose.centre += Vec2(c * step(0) - s * step(1), s * step(0) + c * step(1));
       start.pose.theta_rad = wrap_pi(start.pose.theta_rad + step(2));
       start.latency_ms = latency_ms;
-      Fit other = refine(fields_, crossings_, start, priors_);
+      Fit other = refine(fields_, crossings_, start, priors_, Start::Close);
       if (other.log_likelihood > fit_.log_likelihood &&
           same_place(fields_, other.state.pose, first.state.pose))
         fit_ = std::move(other);
@@ -229,8 +246,7 @@ class Solver {
       if (candidates_.front().likelihood - candidate.likelihood > kFarBehind_nats) break;
       if (image_of_found(candidate.state.pose)) continue;
       Rival rival;
-      rival.fit = refine(fields_, crossings_, polish(fields_, medium_, candidate.state.pose, 4, &iterations_),
-                         priors_);
+      rival.fit = refined(candidate.state.pose);
       if (image_of_found(rival.fit.state.pose)) continue;
       rival.turned = candidate.turned;
       rival.gap_nats =
