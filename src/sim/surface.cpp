@@ -7,6 +7,9 @@ namespace weldcell::sim {
 
 namespace {
 constexpr double kCell_mm = 2;
+constexpr double kCastTolerance_mm = 1e-5;
+constexpr double kMarch_mm = 0.1;     // steps in plan over a body that is not convex
+constexpr double kSight_mm = 1e-3;    // what lies closer to a surface point than this does not hide it
 constexpr double kAlongMember = 0.9;  // |cos| to the member's longest side: a long side, not an end
 }  // namespace
 
@@ -38,7 +41,6 @@ Surface::Surface(const Scene& scene, double reach_mm)
     if (signed_area(body.outline) < 0) std::reverse(body.outline.begin(), body.outline.end());
     body.box = bounds(body.outline);
     body.radius_mm = std::min(scene.workpiece.members[i].edge_radius_mm, height_mm_);
-    roundest_mm_ = std::max(roundest_mm_, body.radius_mm);
     const std::size_t n = body.outline.size();
     Vec2 longest = Vec2::Zero();
     for (std::size_t k = 0; k < n; ++k) {
@@ -72,17 +74,21 @@ Surface::Surface(const Scene& scene, double reach_mm)
   }
 }
 
-double Surface::height_of(const Body& body, const Vec2& p) const {
-  if ((p.array() < body.box.min.array()).any() || (p.array() > body.box.max.array()).any()) return 0;
-  if (!body.convex && !contains(body.outline, p)) return 0;
+double Surface::roof(const Body& body, const Vec2& inside) const {
   double rounding = body.radius_mm;
   for (const Side& side : body.sides) {
-    const double inside = side.inward.dot(p) - side.offset;
-    if (body.convex && inside < 0) return 0;
-    if (side.round && inside >= 0) rounding = std::min(rounding, inside);
+    if (side.round) rounding = std::min(rounding, std::max(0.0, side.inward.dot(inside) - side.offset));
   }
   const double r = body.radius_mm, missing = r - rounding;
   return missing <= 0 ? height_mm_ : height_mm_ - r + std::sqrt(std::max(0.0, r * r - missing * missing));
+}
+
+double Surface::height_of(const Body& body, const Vec2& p) const {
+  if ((p.array() < body.box.min.array()).any() || (p.array() > body.box.max.array()).any()) return 0;
+  const bool inside = body.convex ? std::all_of(body.sides.begin(), body.sides.end(),
+                                                [&](const Side& s) { return s.inward.dot(p) >= s.offset; })
+                                  : contains(body.outline, p);
+  return inside ? roof(body, p) : 0;
 }
 
 double Surface::height(double x_mm, double y_mm) const {
@@ -127,60 +133,72 @@ Surface::Around Surface::around(double x_mm, double y_mm) {
 
 double Surface::cast(const Eigen::Vector3d& from, const Eigen::Vector3d& direction) const {
   if (direction.z() > -0.05) return -1;
-  const double top = (from.z() - top_mm()) / -direction.z(), table = (from.z() - table_mm_) / -direction.z();
-  const auto above = [&](double t) {
-    return from.z() + t * direction.z() - table_mm_ -
-           height(from.x() + t * direction.x(), from.y() + t * direction.y());
+  const double table = (table_mm_ - from.z()) / direction.z();
+  const double top = std::max(0.0, (top_mm() - from.z()) / direction.z());
+  double nearest = table;
+  for (const Body& body : bodies_) nearest = std::min(nearest, first_hit(body, from, direction, top, table));
+  return nearest;
+}
+
+double Surface::first_hit(const Body& body, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                          double begin, double end) const {
+  const Vec2 start = from.head<2>(), way = direction.head<2>();
+  const double nothing = end;
+  // The part of the ray over the outline's convex hull, or over its box.
+  const auto clip = [&](double inside, double rate) {
+    if (std::abs(rate) < 1e-12) {
+      if (inside < 0) end = begin - 1;
+    } else {
+      (rate > 0 ? begin = std::max(begin, -inside / rate) : end = std::min(end, -inside / rate));
+    }
   };
-  if (above(top) <= 1e-9) return top;
-  const double at_table = height(from.x() + table * direction.x(), from.y() + table * direction.y());
-  if (at_table <= 0 && std::abs(above((top + table) / 2) - height_mm_ / 2) < 1e-9) return table;
-  // Between the planes: a round edge, or a side wall met by a tilted beam. One that leaves the outline
-  // downwards meets the round edge or passes it and then meets nothing, so that each is looked for by itself.
-  const double walls = top + roundest_mm_ / -direction.z();
-  double free = top, blocked = table;
-  if (above(walls) <= 0) {
-    blocked = walls;
-  } else if (at_table <= 0) {
-    return table;
-  } else {
-    free = walls;
+  for (const int axis : {0, 1}) {
+    clip(start[axis] - body.box.min[axis], way[axis]);
+    clip(body.box.max[axis] - start[axis], -way[axis]);
   }
-  for (int i = 0; i < 24; ++i) {
-    const double middle = 0.5 * (free + blocked);
-    (above(middle) > 0 ? free : blocked) = middle;
+  for (const Side& side : body.sides) {
+    if (!body.convex || begin > end) break;
+    clip(side.inward.dot(start) - side.offset, side.inward.dot(way));
   }
-  return blocked;
+  if (begin > end) return nothing;
+  const auto above = [&](double t) {
+    const Vec2 p = start + t * way;
+    return from.z() + t * direction.z() - table_mm_ - (body.convex ? roof(body, p) : height_of(body, p));
+  };
+  const auto between = [&](double free, double blocked) {
+    while (blocked - free > kCastTolerance_mm) {
+      const double middle = 0.5 * (free + blocked);
+      (above(middle) > 0 ? free : blocked) = middle;
+    }
+    return blocked;
+  };
+  if (above(begin) <= 1e-9) return begin;
+  // Under the round edges there is nothing but the wall, which the ray has passed already.
+  if (body.convex) end = std::min(end, (top_mm() - body.radius_mm - from.z()) / direction.z());
+  if (above(end) <= 0 && body.convex) return between(begin, end);
+  if (!body.convex) {
+    const double steps = std::ceil((end - begin) * way.norm() / kMarch_mm) + 1;
+    for (double i = 1, free = begin; i <= steps; ++i) {
+      const double t = begin + (end - begin) * i / steps;
+      if (above(t) <= 0) return between(free, t);
+      free = t;
+    }
+    return nothing;
+  }
+  // The solid is convex, so that the height over it along a ray is a convex function: it may dip in between.
+  double left = begin, right = end;
+  while (right - left > kCastTolerance_mm) {
+    const double third = (right - left) / 3, a = left + third, b = right - third;
+    if (above(a) <= 0) return between(begin, a);
+    (above(a) < above(b) ? right = b : left = a);
+  }
+  return nothing;
 }
 
 bool Surface::sees(const Eigen::Vector3d& point, const Eigen::Vector3d& eye) const {
-  const double to_top = top_mm() - point.z();
-  if (to_top <= 0 || eye.z() <= point.z()) return true;
-  const Vec2 from = point.head<2>();
-  const Vec2 way = (eye - point).head<2>() * (to_top / (eye.z() - point.z()));
-  for (const Body& body : bodies_) {
-    // The part of the way, from the point up to the height of the tops, that lies over this body.
-    double in = 0, out = 1;
-    for (const Side& side : body.sides) {
-      if (!body.convex) break;
-      const double at = side.inward.dot(from) - side.offset, rate = side.inward.dot(way);
-      if (std::abs(rate) < 1e-12) {
-        if (at < 0) in = 2;
-      } else if (rate > 0) {
-        in = std::max(in, -at / rate);
-      } else {
-        out = std::min(out, -at / rate);
-      }
-    }
-    if (in >= out - 1e-9) continue;
-    if (body.convex && body.radius_mm == 0) return false;
-    constexpr int kSteps = 8;
-    for (int i = 1; i <= kSteps; ++i) {
-      const double t = in + (out - in) * (i - 0.5) / kSteps;
-      if (height_of(body, from + t * way) > point.z() - table_mm_ + t * to_top + 1e-6) return false;
-    }
-  }
-  return true;
+  if (point.z() >= top_mm() || eye.z() <= point.z()) return true;
+  const double distance = (point - eye).norm();
+  return cast(eye, (point - eye) / distance) > distance - kSight_mm;
 }
 
 }  // namespace weldcell::sim

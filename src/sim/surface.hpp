@@ -46,11 +46,15 @@ class Surface {
     double radius_mm = 0;
     bool convex = true;
   };
+  /// Height of a body's top over the table at a point inside of its outline.
+  double roof(const Body& body, const Vec2& inside) const;
   double height_of(const Body& body, const Vec2& p) const;
+  /// Distance along the ray to the body, looked for from `begin` to `end`, which is also the answer for none.
+  double first_hit(const Body& body, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                   double begin, double end) const;
   Around classify(const Vec2& center) const;
 
   double table_mm_, height_mm_, reach_mm_;
-  double roundest_mm_ = 0;  ///< largest radius of an edge
   std::vector<Body> bodies_;
   Box2 area_;
   std::size_t columns_ = 0, rows_ = 0;
