@@ -231,6 +231,18 @@ double Alternatives::score(const Variant& part, const Region& region) const {
   return explained_nats(edges, region) - unseen_nats_ * unseen_on(edges, region);
 }
 
+double Alternatives::slots_nats(const Variant& part, Region region) const {
+  const auto hidden_in = [&](const Variant& variant) {
+    const auto unseen = [&](double joint_gap_mm) {
+      region.joint_gap_mm = joint_gap_mm;
+      return unseen_on(edges_within(variant, region), region);
+    };
+    return unseen(kJointGap_mm) - unseen(kNarrow_mm);
+  };
+  const int drawn = hidden_in({});
+  return drawn > 0 ? unseen_nats_ * std::max(0, drawn - hidden_in(part)) : 0;
+}
+
 double Alternatives::whole() const {
   Region all;
   all.box = kEverywhere;
@@ -393,7 +405,9 @@ void Alternatives::displaced_from(const Polygon& outline, bool anywhere, Region&
     if (most - unseen_nats_ * unseen_on(visible(part, m, kJointGap_mm, region.box), region) < kHopeless_nats)
       continue;
     if (!drawn_known) region.drawn_nats = score({}, region), drawn_known = true;
-    const double gain = score(part, region) - region.drawn_nats;
+    double gain = score(part, region) - region.drawn_nats;
+    if (gain < kHopeless_nats || gain <= best.gain_nats) continue;
+    gain -= slots_nats(part, region);
     if (gain > best.gain_nats) best = {best.member, trial.shift, trial.points, gain};
   }
 }

@@ -96,6 +96,9 @@ class Alternatives {
                                               const Box2& within) const;
   double explained_nats(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
   double score(const Variant& part, const Region& region) const;
+  /// What `score` has credited to a variant for closing slots of the drawing that may be too narrow to be
+  /// seen.
+  double slots_nats(const Variant& part, Region region) const;
   int unseen_on(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
   std::vector<Vote> votes(const Polygon& outline, const Region& region, bool loosely) const;
   void displaced_from(const Polygon& outline, bool anywhere, Region& region, Displacement& best) const;

@@ -28,6 +28,7 @@ constexpr double kOnTheLimit_rad = rad(0.1);
 constexpr double kLeft_mm = 3;
 /// A millisecond that looks like so much turn at the farthest point is told apart from it by little.
 constexpr double kCoupled_mm_per_ms = 0.05;
+constexpr double kSameLatency_ms = 1;
 /// At least two points, so that no stray one alone tells which of two members is off.
 constexpr double kTellsMembers_nats = 12;
 
@@ -233,6 +234,8 @@ class Solver {
       start.pose.theta_rad = wrap_pi(start.pose.theta_rad + step(2));
       start.latency_ms = latency_ms;
       Fit other = refine(fields_, crossings_, start, priors_, Start::Close);
+      // What comes back to the same latency has only settled its members in another way.
+      if (std::abs(other.state.latency_ms - first.state.latency_ms) < kSameLatency_ms) continue;
       if (other.log_likelihood > fit_.log_likelihood &&
           same_place(fields_, other.state.pose, first.state.pose))
         fit_ = std::move(other);
