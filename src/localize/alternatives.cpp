@@ -29,6 +29,9 @@ constexpr double kBeside_mm = 5;
 /// An edge shows its ends right within a box when all is known so far around it: joints and the shortest
 /// edges reach less far.
 constexpr double kBeyond_mm = 12;
+/// A crossing is missed once in forty before anything is known of a scan: a beta prior of so many crossings.
+/// With a flat one a scan of two members could never say by one crossing that nothing is there.
+constexpr double kMissedBefore = 0.5, kSeenBefore = 20;
 /// Below this nothing is worth a closer look.
 constexpr double kHopeless_nats = 3;
 
@@ -105,7 +108,8 @@ Alternatives::Alternatives(const workpiece::OutlineTemplate& outline, const std:
   // anywhere.
   point_nats_ = std::clamp(std::log(length / (clutter * kOnEdge_mm)), 2.0, 9.0);
   const double missed = std::max(0, evidence.expected - evidence.seen);
-  unseen_nats_ = std::clamp(-std::log((missed + 1.0) / (evidence.expected + 2.0)), 0.3, 5.0);
+  unseen_nats_ = std::clamp(
+      -std::log((missed + kMissedBefore) / (evidence.expected + kMissedBefore + kSeenBefore)), 0.3, 5.0);
 }
 
 Alternatives::Region Alternatives::around(std::size_t member) const {

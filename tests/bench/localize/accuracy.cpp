@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "book.hpp"
+#include "unshown.hpp"
 
 namespace weldcell::bench {
 
@@ -163,6 +164,9 @@ void latency(Book& book) {
           run_cell(part, s, book.options.paper_trials, seed, solver_of(part, s, localize::Method::Paper));
       book.explain(name, t);
       book.add(name + " success", t.share(t.success), "%", paper.share(paper.success), 100, Better::Higher);
+      book.add(name + " false reject", t.share(t.false_reject), "%", paper.share(paper.false_reject), 5);
+      book.add(name + " asked for another scan", t.share(t.again), "%",
+               share_left_open(part, s, book.options.trials, seed), NAN, Better::None);
       book.add(name + " RMS/CRLB", t.ratio(), "1", paper.judged > 0 ? paper.ratio() : NAN, NAN, Better::None);
       book.add(name + " NEES", t.mean_nees(), "1", 1, 1.5);
       book.add(name + " latency error", 1e3 * std::sqrt(t.latency_square / t.judged), "ms",

@@ -13,7 +13,6 @@ using workpiece::OutlineTemplate;
 
 namespace {
 
-constexpr double kGrazing = 0.1;  ///< |travel . normal| below which no step is seen
 constexpr double kInsetPrior_mm = 0.5;
 constexpr double kDrawnFromCorner_mm = 100;
 

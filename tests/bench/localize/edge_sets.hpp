@@ -12,6 +12,8 @@
 
 namespace weldcell::bench {
 
+inline constexpr double kGrazing = 0.1;  ///< |travel . normal| below which no step is seen
+
 /// How a part lies and is scanned. The part lies within shift_mm (each axis) and turn_deg of planned, members
 /// within member_mm (each axis) and member_deg of the drawing; all uniform.
 struct Setting {

@@ -9,7 +9,7 @@
 
 #include "book.hpp"
 #include "planned_scan.hpp"
-#include "weldcell/workpiece/departures.hpp"
+#include "unshown.hpp"
 #include "weldments.hpp"
 
 namespace weldcell::bench {
@@ -23,62 +23,6 @@ double length_of(const std::vector<PathPiece>& path) {
   double out = 0;
   for (const PathPiece& p : path) out += std::hypot(p.x1_mm - p.x0_mm, p.y1_mm - p.y0_mm);
   return out;
-}
-
-constexpr double kSameStep_mm = 5;  ///< steps of like sense closer than this along the travel are one
-
-struct Step {
-  double at_mm;
-  bool up;
-};
-
-std::vector<Step> steps_on(const Segment& piece, std::span<const workpiece::VisibleEdge> edges) {
-  std::vector<Step> out;
-  for (const workpiece::VisibleEdge& e : edges) {
-    const double from = (piece.a - e.line.a).dot(e.outward), to = (piece.b - e.line.a).dot(e.outward);
-    if ((from < 0) == (to < 0)) continue;
-    const double share = from / (from - to);
-    const double along = (piece.a + share * (piece.b - piece.a) - e.line.a).dot(e.line.direction());
-    if (along >= 0 && along <= e.line.length()) out.push_back({share * piece.length(), to < from});
-  }
-  return out;
-}
-
-bool shows(const std::vector<Step>& one, const std::vector<Step>& other) {
-  return std::any_of(one.begin(), one.end(), [&](const Step& s) {
-    return std::none_of(other.begin(), other.end(), [&](const Step& o) {
-      return o.up == s.up && std::abs(o.at_mm - s.at_mm) < kSameStep_mm;
-    });
-  });
-}
-
-/// Whether the part could be other than drawn, in a way that a pass could show, without one crossing of this
-/// scan being there or away: what no rule can tell, so that a good part must be sent back as well.
-bool leaves_something_open(const PartUnderTest& part, const EdgeSet& set,
-                           const localize::LocalizeOptions& options) {
-  const std::vector<Polygon>& drawn = part.outline().members;
-  std::vector<Segment> pieces;
-  const Pose2 to_part = set.truth.inverse();
-  for (const PathPiece& p : set.path)
-    pieces.push_back({to_part * Vec2(p.x0_mm, p.y0_mm), to_part * Vec2(p.x1_mm, p.y1_mm)});
-  for (std::size_t m = 0; m < drawn.size(); ++m) {
-    for (const workpiece::Departure& d : workpiece::departures(
-             drawn, part.outline().edges, m, options.prove_shift_mm, options.prove_free_ends)) {
-      if (!workpiece::telling_pass(drawn, d)) continue;
-      std::vector<Polygon> other = drawn;
-      other[m] = d.instead;
-      std::vector<workpiece::VisibleEdge> instead;
-      for (std::size_t k = 0; k < other.size(); ++k) {
-        for (const workpiece::VisibleEdge& e : workpiece::visible_edges(other, k)) instead.push_back(e);
-      }
-      if (std::none_of(pieces.begin(), pieces.end(), [&](const Segment& piece) {
-            const std::vector<Step> a = steps_on(piece, part.outline().edges), b = steps_on(piece, instead);
-            return shows(a, b) || shows(b, a);
-          }))
-        return true;
-    }
-  }
-  return false;
 }
 
 /// Whether a lengthened part's end lies in a joint, where from above it is the part as drawn but for what
