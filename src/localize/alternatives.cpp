@@ -277,6 +277,13 @@ double Alternatives::gain(std::size_t member, const Polygon& instead, const Box2
   return other.explained_nats - drawn.explained_nats - unseen_nats_ * (unseen - drawn.surely);
 }
 
+double Alternatives::places_nats() const {
+  double out = 1;
+  for (const Polygon& outline : outlines_)
+    out += static_cast<double>(axes_of(outline).size()) * 2 * (kMost_mm - kLeast_mm) / (2 * kOnEdge_mm);
+  return std::log(out);
+}
+
 double Alternatives::missing(int member) const {
   const auto m = static_cast<std::size_t>(member);
   const Region region = around(m);
@@ -396,7 +403,8 @@ void Alternatives::displaced_from(const Polygon& outline, bool anywhere, Region&
                         found[i].points + found[k].points});
     }
   }
-  for (std::size_t i = 0; bared > 0 && i < axes.size(); ++i) {
+  // Where nothing votes, a crossing that was not seen, or a side laid bare, may tell all the same.
+  for (std::size_t i = 0; bared + unseen_[m] > 0 && i < axes.size(); ++i) {
     for (const double by : {-48.0, -32.0, -20.0, -12.0, -6.0, 6.0, 12.0, 20.0, 32.0, 48.0})
       trials.push_back({by * axes[i], 0});
   }

@@ -31,6 +31,9 @@ class Alternatives {
   /// The best displacement of the member between kLeast_mm and kMost_mm: along its sides' normals, and along
   /// two of them at once when `anywhere`.
   Displacement displaced(int member, bool anywhere) const;
+  /// Logarithm of how many displacements of one member the points could tell apart: so much a best one gains
+  /// by having been looked for.
+  double places_nats() const;
   /// Log-likelihood of a part without the member over the drawing as it is, nats.
   double missing(int member) const;
 

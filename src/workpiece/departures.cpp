@@ -318,6 +318,26 @@ std::vector<Departure> departures(std::span<const Polygon> members, std::span<co
   return out;
 }
 
+std::vector<Departure> shifts(std::span<const Polygon> members, std::size_t member, const Vec2& by_mm) {
+  std::vector<Departure> out;
+  const Polygon& outline = members[member];
+  const auto moves = [&](const Departure& d) { return std::abs(d.outward.dot(by_mm)); };
+  for (std::size_t k = 0; k < outline.size(); ++k) {
+    Departure move;
+    move.member = static_cast<int>(member);
+    move.side = static_cast<int>(k);
+    move.whole = true;
+    move.end = is_end(outline, k);
+    move.outward = side_of(outline, k).n;
+    move.instead = shifted(outline, by_mm);
+    move.reach = both(bounds(outline), bounds(move.instead));
+    if (moves(move) > kMinAcross * by_mm.norm()) out.push_back(std::move(move));
+  }
+  std::stable_sort(out.begin(), out.end(),
+                   [&](const Departure& a, const Departure& b) { return moves(a) > moves(b); });
+  return out;
+}
+
 int crossings_that_tell(std::span<const VisibleEdge> drawn, std::span<const VisibleEdge> instead,
                         const Segment& pass) {
   // What one has for sure and the other not even near the end of an edge.

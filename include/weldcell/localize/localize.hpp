@@ -82,7 +82,7 @@ struct Localization {
   double inset_mm = 0;
   std::vector<Alternative> alternatives;
   std::vector<MemberPose> members;
-  std::vector<ScanLine> rescan;  ///< what settles "not_looked_at": all of these
+  std::vector<ScanLine> rescan;  ///< what settles "not_looked_at", or "wrong_revision" in doubt: all of these
   int iterations = 0;
 };
 

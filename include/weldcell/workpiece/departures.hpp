@@ -29,6 +29,10 @@ struct Departure {
 std::vector<Departure> departures(std::span<const Polygon> members, std::span<const VisibleEdge> visible,
                                   std::size_t member, double by_mm, bool free_ends);
 
+/// One member shifted as it is, by that much, frame Part: once for each side that would move, the farthest
+/// first.
+std::vector<Departure> shifts(std::span<const Polygon> members, std::size_t member, const Vec2& by_mm);
+
 /// Whether a side of the outline is an end: it runs across the longest one.
 bool is_end(const Polygon& outline, std::size_t side);
 

@@ -89,7 +89,7 @@ void judge(const workpiece::OutlineTemplate& outline, const Setting& setting, co
   tally.false_reject += right && found.verdict == Verdict::Reject;
   tally.again += right && found.verdict == Verdict::Rescan;
   if (accepted && !right) ++tally.blunders["accepted wrong, " + label];
-  if (right && !accepted && found.cause != "not_looked_at" && setting.members_missing == 0)
+  if (right && !accepted && found.rescan.empty() && setting.members_missing == 0)
     ++tally.blunders["refused as " + found.cause + ", " + label];
   if (!near) {
     ++tally.blunders["missed (" + found.cause + "), " + label];

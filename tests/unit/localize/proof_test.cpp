@@ -86,6 +86,38 @@ TEST(Proof, AMemberMovedWhereNobodyLookedIsFoundByTheLinesAskedFor) {
   EXPECT_NE(second.reason.find("rung_1"), std::string::npos) << second.reason;
 }
 
+TEST(Proof, OneStrayPointWhereADisplacedMemberWouldEndIsLookedAtAgain) {
+  std::vector<PathPiece> lines = blind_lines();
+  // Over the lower joint there is nothing but one step where a rung pushed up by 20 mm would end.
+  Scan seen;
+  scan(drawing().outline(), lines, 7, seen);
+  seen.path.push_back({-285, -180, -285, -204});
+  seen.edges.push_back({-285, -190, 0, -1, -1, 0.3, 200, false});
+  const Localization first = drawing().localize(seen.edges, seen.path, {});
+  ASSERT_EQ(first.verdict, Verdict::Rescan) << first.reason;
+  EXPECT_EQ(first.cause, "wrong_revision");
+  EXPECT_NE(first.reason.find("seems to"), std::string::npos) << first.reason;
+  ASSERT_EQ(first.rescan.size(), 2U);
+  EXPECT_EQ(first.rescan.front().member, "rung_1");
+
+  scan(drawing().outline(), lines_asked_for(first), 8, seen);
+  const Localization second = drawing().localize(seen.edges, seen.path, {});
+  EXPECT_EQ(second.verdict, Verdict::Weld) << second.reason;
+}
+
+TEST(Proof, TwoLostCrossingsAloneNameTheMember) {
+  // Over the slot of a rung pushed up no line runs along the rung: only lines across it see nothing there.
+  const auto part = workpiece::build_template(ladder(20));
+  ASSERT_TRUE(part.ok());
+  std::vector<PathPiece> lines = blind_lines();
+  lines.push_back({-600, -200, 600, -200});
+  Scan seen;
+  scan(*part, lines, 9, seen);
+  const Localization found = drawing().localize(seen.edges, seen.path, {});
+  EXPECT_EQ(found.cause, "wrong_revision") << found.reason;
+  EXPECT_NE(found.reason.find("rung_1"), std::string::npos) << found.reason;
+}
+
 TEST(Proof, NothingIsAskedWithoutAPathOrWhenSwitchedOff) {
   Scan seen;
   scan(drawing().outline(), blind_lines(), 5, seen);

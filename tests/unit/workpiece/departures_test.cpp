@@ -112,6 +112,24 @@ TEST(Departures, AMemberTurnedAboutOneEndSwingsAtTheOther) {
   EXPECT_EQ(turns, 4);
 }
 
+TEST(Departures, AShiftIsAskedAcrossTheSideThatMovesFarthest) {
+  const auto part = build_template(frame());
+  ASSERT_TRUE(part.ok());
+  const std::vector<Departure> up = shifts(part->members, kPost, {3, 20});
+  ASSERT_EQ(up.size(), 2U) << "the ends only";
+  EXPECT_NEAR(up.front().instead.front().y(), part->members[kPost].front().y() + 20, 1e-9);
+  for (const Departure& d : up) {
+    EXPECT_TRUE(d.whole);
+    EXPECT_TRUE(d.end);
+  }
+  const std::vector<Departure> aside = shifts(part->members, kPost, {-20, 0});
+  ASSERT_EQ(aside.size(), 2U);
+  EXPECT_FALSE(aside.front().end);
+  const auto pass = telling_pass(part->members, aside.front());
+  ASSERT_TRUE(pass.has_value());
+  EXPECT_NEAR(pass->a.y(), pass->b.y(), 1e-9) << "square across a long side";
+}
+
 TEST(Departures, CrossingsThatTell) {
   const auto part = build_template(frame());
   ASSERT_TRUE(part.ok());
