@@ -8,24 +8,12 @@
 #include "app/command_line.hpp"
 #include "app/places.hpp"
 #include "weldcell/adapters/cad_child.hpp"
+#include "weldcell/base/markup.hpp"
 #include "weldcell/files/workpiece_file.hpp"
 
 namespace weldcell::app {
 
 namespace {
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '<')
-      out += "&lt;";
-    else if (c == '&')
-      out += "&amp;";
-    else
-      out += c;
-  }
-  return out;
-}
 
 /// The workpiece from above, y up: outlines, round edges dashed, welds red.
 std::string svg_of(const workpiece::Workpiece& workpiece) {

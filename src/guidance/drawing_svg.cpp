@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "weldcell/base/markup.hpp"
 #include "weldcell/guidance/drawing.hpp"
 
 namespace weldcell::guidance {
@@ -21,29 +22,6 @@ const char* css(Colour colour) {
       return "#ff8a5c";
   }
   return "#ffffff";
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return out;
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
-#include "markup.hpp"
 #include "plane_svg.hpp"
+#include "wording.hpp"
 
 namespace weldcell::review {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "markup.hpp"
+#include "wording.hpp"
 
 namespace weldcell::review {
 

@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "figures.hpp"
-#include "markup.hpp"
 #include "style.hpp"
 #include "tables.hpp"
 #include "weldcell/base/units.hpp"
+#include "wording.hpp"
 
 namespace weldcell::review {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "markup.hpp"
 #include "weldcell/base/units.hpp"
+#include "wording.hpp"
 
 namespace weldcell::review {
 

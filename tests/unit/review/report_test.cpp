@@ -8,8 +8,8 @@
 #include <regex>
 #include <set>
 
-#include "review/markup.hpp"
 #include "review/plane_svg.hpp"
+#include "review/wording.hpp"
 #include "sample.hpp"
 
 namespace weldcell::review {
@@ -66,19 +66,6 @@ std::string first_fault(const std::string& html) {
     if (name == "style" && !closing) at = html.find("</style>", at);
   }
   return open.empty() ? "" : "<" + open.back() + "> is not closed";
-}
-
-TEST(Escaped, MakesEveryByteSafe) {
-  EXPECT_EQ(escaped("<a href=\"x\">&'"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;");
-  EXPECT_EQ(escaped("Tr\xC3\xA4ger \xE2\x82\xAC \xF0\x9F\x94\xA5"),
-            "Tr\xC3\xA4ger \xE2\x82\xAC \xF0\x9F\x94\xA5");
-  const std::string bad = "\xEF\xBF\xBD";
-  EXPECT_EQ(escaped("\xFF"), bad);
-  EXPECT_EQ(escaped("\xC0\xAF"), bad + bad) << "long form";
-  EXPECT_EQ(escaped("\xED\xA0\x80"), bad + bad + bad) << "surrogate";
-  EXPECT_EQ(escaped("\xF4\x90\x80\x80"), bad + bad + bad + bad) << "beyond U+10FFFF";
-  EXPECT_EQ(escaped("\xE2\x82"), bad + bad) << "cut short";
-  EXPECT_EQ(escaped(std::string_view("a\0b\x01", 4)), "a" + bad + "b" + bad);
 }
 
 TEST(Number, PrintsNoNegativeZeroAndNoNan) {

@@ -1,15 +1,12 @@
-// Text that is safe inside HTML and SVG, and numbers as the page prints them. Pure.
+// Numbers and verdicts as the page prints them. Pure.
 #pragma once
 
 #include <string>
-#include <string_view>
 
+#include "weldcell/base/markup.hpp"
 #include "weldcell/localize/localize.hpp"
 
 namespace weldcell::review {
-
-/// Escapes & < > " '; bytes that are no UTF-8 and control characters become U+FFFD.
-std::string escaped(std::string_view text);
 
 /// Fixed decimals; "-" when not finite, and never a negative zero.
 std::string number(double value, int decimals);
