@@ -81,7 +81,6 @@ Alternatives::Alternatives(const workpiece::OutlineTemplate& outline, const std:
     members_.push_back(transformed(outline.members[m], {t.x(), t.y(), u.z()}));
   }
   for (const Polygon& member : members_) boxes_.push_back(bounds(member));
-  drawn_.resize(members_.size());
   const double c = std::cos(fit.state.pose.theta_rad), s = std::sin(fit.state.pose.theta_rad);
   const auto turned = [&](const Vec2& v) { return Vec2(c * v.x() + s * v.y(), -s * v.x() + c * v.y()); };
   spots_.reserve(crossings.size());
@@ -180,6 +179,19 @@ std::vector<VisibleEdge> Alternatives::visible(const Variant& part, std::size_t 
   return out;
 }
 
+bool Alternatives::touched(const Box2& box, const Region& region) {
+  // Spots may lie a little off an edge, crossings lie on it.
+  const Box2 near_spots = grown(box, 2 * kOnEdge_mm), on = common(grown(box, kOnEdge_mm), region.box);
+  const auto before = [](const Spot& s, double x) { return s.place.x() < x; };
+  for (auto s = std::lower_bound(region.spots.begin(), region.spots.end(), near_spots.min.x(), before);
+       s != region.spots.end() && s->place.x() <= near_spots.max.x(); ++s) {
+    if (in_box(s->place, near_spots)) return true;
+  }
+  return std::any_of(region.pieces.begin(), region.pieces.end(), [&](const Piece& p) {
+    return !apart({p.from.cwiseMin(p.to), p.from.cwiseMax(p.to)}, on);
+  });
+}
+
 std::vector<VisibleEdge> Alternatives::edges_within(const Variant& part, const Region& region) const {
   // Where a member is not as drawn here, what is beside its old or its new place may show other edges.
   std::vector<Box2> changed;
@@ -194,19 +206,23 @@ std::vector<VisibleEdge> Alternatives::edges_within(const Variant& part, const R
   std::vector<VisibleEdge> edges;
   for (std::size_t m = 0; m < members_.size(); ++m) {
     const Box2& own = box_of(part, m);
-    if (apart(own, region.box) || outline_of(part, m).empty()) continue;
-    const bool anew =
-        region.joint_gap_mm != kJointGap_mm ||
-        std::any_of(changed.begin(), changed.end(), [&](const Box2& c) { return !apart(own, c); });
-    if (anew) {
+    if (apart(own, region.box) || outline_of(part, m).empty() || !touched(own, region)) continue;
+    if (std::any_of(changed.begin(), changed.end(), [&](const Box2& c) { return !apart(own, c); })) {
       const std::vector<VisibleEdge> shown = visible(part, m, region.joint_gap_mm, region.box);
       std::copy_if(shown.begin(), shown.end(), std::back_inserter(edges), reaches);
-      continue;
+    } else {
+      const std::vector<VisibleEdge>& shown = drawn(m, region.joint_gap_mm);
+      std::copy_if(shown.begin(), shown.end(), std::back_inserter(edges), reaches);
     }
-    if (!drawn_[m]) drawn_[m] = visible({}, m, kJointGap_mm, kEverywhere);
-    std::copy_if(drawn_[m]->begin(), drawn_[m]->end(), std::back_inserter(edges), reaches);
   }
   return edges;
+}
+
+const std::vector<VisibleEdge>& Alternatives::drawn(std::size_t member, double joint_gap_mm) const {
+  auto& known = drawn_[joint_gap_mm];
+  if (known.empty()) known.resize(members_.size());
+  if (!known[member]) known[member] = visible({}, member, joint_gap_mm, kEverywhere);
+  return *known[member];
 }
 
 double Alternatives::explained_nats(const std::vector<VisibleEdge>& edges, const Region& region) const {
@@ -254,27 +270,27 @@ double Alternatives::whole() const {
   return explained_nats(edges_within({}, all), all);
 }
 
-double Alternatives::gain(std::size_t member, const Polygon& instead, const Box2& within) const {
+bool Alternatives::refutes(std::size_t member, const Polygon& instead, const Box2& within,
+                           double nats) const {
   Region region = inside(grown(within, kSeenAt_mm));
   region.end_margin_mm = kLeastEndMargin_mm;
-  struct Look {
-    double explained_nats;
-    int unseen, surely;  ///< crossings not seen; those that no narrow slot can have hidden
+  const Variant drawn, other{member, &instead, bounds(instead)};
+  // A point may lie on a side that a narrow slot shows; nobody has to have seen one there.
+  const auto unseen = [&](const Variant& part, double joint_gap_mm) {
+    region.joint_gap_mm = joint_gap_mm;
+    return unseen_on(edges_within(part, region), region);
   };
-  const auto look = [&](const Variant& part) {
-    const auto edges = [&](double joint_gap_mm) {
-      region.joint_gap_mm = joint_gap_mm;
-      return edges_within(part, region);
-    };
-    // A point may lie on a side that a narrow slot shows; nobody has to have seen one there.
-    return Look{explained_nats(edges(kJointGap_mm), region), unseen_on(edges(kClosed_mm), region),
-                unseen_on(edges(kNarrow_mm), region)};
+  const double explained = explained_nats(edges_within(other, region), region) -
+                           explained_nats(edges_within(drawn, region), region);
+  // Crossings that no narrow slot can have hidden; slots that the drawing has as well hide as much in both.
+  const int surely = unseen(drawn, kNarrow_mm);
+  const auto refuted_by = [&](int unseen_there) {
+    return explained - unseen_nats_ * (unseen_there - surely) <= -nats;
   };
-  const Look drawn = look({}), other = look({member, &instead, bounds(instead)});
-  // Slots that the drawing has as well hide as much in both.
-  const int hidden = drawn.unseen - drawn.surely;
-  const int unseen = other.surely + std::max(0, other.unseen - other.surely - hidden);
-  return other.explained_nats - drawn.explained_nats - unseen_nats_ * (unseen - drawn.surely);
+  if (refuted_by(0)) return true;
+  const int hidden = unseen(drawn, kClosed_mm) - surely;
+  const int closed = unseen(other, kClosed_mm);
+  return refuted_by(closed - hidden) || refuted_by(unseen(other, kNarrow_mm));
 }
 
 double Alternatives::places_nats() const {

@@ -2,6 +2,7 @@
 // it is. Pure.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -37,9 +38,9 @@ class Alternatives {
   /// Log-likelihood of a part without the member over the drawing as it is, nats.
   double missing(int member) const;
 
-  /// Log-likelihood, over the drawing as it is, of a part that has this outline instead of the member's and
-  /// differs within the box only, nats.
-  double gain(std::size_t member, const Polygon& instead, const Box2& within) const;
+  /// Whether the scan prefers the drawing as it is, by this many nats or more, to a part that has this outline
+  /// instead of the member's and differs within the box only.
+  bool refutes(std::size_t member, const Polygon& instead, const Box2& within, double nats) const;
   /// The members' outlines where the fit has them, frame Part.
   const std::vector<Polygon>& members() const { return members_; }
 
@@ -92,8 +93,13 @@ class Alternatives {
   const Box2& box_of(const Variant& part, std::size_t member) const {
     return part.outline != nullptr && part.member == member ? part.box : boxes_[member];
   }
-  /// The edges that lie within the region's box; beyond it they may lack cuts.
+  /// Whether anything of the region, spot or travel, is at what lies within a box.
+  static bool touched(const Box2& box, const Region& region);
+  /// The edges that lie within the region's box, of members that anything of it touches; beyond it they may
+  /// lack cuts.
   std::vector<workpiece::VisibleEdge> edges_within(const Variant& part, const Region& region) const;
+  /// All edges that a member shows on the drawing as fitted.
+  const std::vector<workpiece::VisibleEdge>& drawn(std::size_t member, double joint_gap_mm) const;
   /// The edges that a member shows within a box; beyond it they may lack cuts.
   std::vector<workpiece::VisibleEdge> visible(const Variant& part, std::size_t member, double joint_gap_mm,
                                               const Box2& within) const;
@@ -110,8 +116,8 @@ class Alternatives {
   std::vector<Polygon> outlines_;  ///< as drawn, frame Part
   std::vector<Polygon> members_;   ///< where the fit has them, frame Part
   std::vector<Box2> boxes_;        ///< of members_
-  /// All visible edges of members_, made when first asked for: not for more than one thread.
-  mutable std::vector<std::optional<std::vector<workpiece::VisibleEdge>>> drawn_;
+  /// What `drawn` has found, by joint gap: not for more than one thread.
+  mutable std::map<double, std::vector<std::optional<std::vector<workpiece::VisibleEdge>>>> drawn_;
   std::vector<Spot> spots_;  ///< by x
   std::vector<Piece> pieces_;
   std::vector<int> unseen_;  ///< crossings of each member that were expected and not seen

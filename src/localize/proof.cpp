@@ -81,7 +81,7 @@ void add_unproven(const Situation& s, const Alternatives& alternatives, const Po
   const std::vector<Polygon>& members = alternatives.members();
   for (Departure& departure : workpiece::departures(members, visible, m, by_mm, s.options.prove_free_ends)) {
     if (held_by_points(departure, members[m], points)) continue;
-    if (alternatives.gain(m, departure.instead, departure.reach) <= -kRefuted_nats) continue;
+    if (alternatives.refutes(m, departure.instead, departure.reach, kRefuted_nats)) continue;
     const std::optional<Segment> pass = workpiece::telling_pass(members, departure);
     if (!pass || std::any_of(out.begin(), out.end(), [&](const Unproven& u) { return alike(u.pass, *pass); }))
       continue;

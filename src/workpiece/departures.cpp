@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 
 namespace weldcell::workpiece {
 
@@ -18,6 +19,9 @@ constexpr double kSame_mm = 5;
 /// Room that a pass keeps before and behind the edges that tell, and from any other edge at its ends.
 constexpr double kRunUp_mm = 20;
 constexpr double kClear_mm = 10;
+/// Ends are moved outwards in steps until they have that room.
+constexpr double kEndStep_mm = 4;
+constexpr int kEndSteps = 15;
 /// Members this much longer than wide have a direction.
 constexpr double kSlender = 2;
 constexpr int kMustTell = 2;
@@ -137,16 +141,23 @@ bool apart(const Box2& a, const Box2& b) {
 }
 
 /// Edges that the members show near the box, one of them with another outline; farther off they may lack
-/// cuts.
+/// cuts. Of members that meet none of the boxes looked at there are none.
 std::vector<VisibleEdge> edges_near(std::span<const Polygon> members, std::size_t member,
-                                    const Polygon& outline, const Box2& box) {
+                                    const Polygon& outline, const Box2& box,
+                                    std::span<const Box2> looked_at) {
   std::vector<Polygon> beside;  // in their order, which decides who shows a piece that two share
+  std::vector<std::size_t> asked;
   for (std::size_t m = 0; m < members.size(); ++m) {
     const Polygon& one = m == member ? outline : members[m];
-    if (!one.empty() && !apart(bounds(one), box)) beside.push_back(one);
+    if (one.empty()) continue;
+    const Box2 own = bounds(one);
+    if (apart(own, box)) continue;
+    if (std::any_of(looked_at.begin(), looked_at.end(), [&](const Box2& b) { return !apart(own, b); }))
+      asked.push_back(beside.size());
+    beside.push_back(one);
   }
   std::vector<VisibleEdge> out;
-  for (std::size_t m = 0; m < beside.size(); ++m) {
+  for (const std::size_t m : asked) {
     for (const VisibleEdge& edge : visible_edges(beside, m, kClosed_mm)) out.push_back(edge);
   }
   return out;
@@ -161,10 +172,18 @@ bool near_edge(const Vec2& place, std::span<const VisibleEdge> edges) {
 /// Ends moved outwards until no edge is within kClear_mm of them.
 Segment with_clear_ends(Segment pass, std::span<const VisibleEdge> edges) {
   const Vec2 d = pass.direction();
-  constexpr int kSteps = 15;
-  for (int i = 0; i < kSteps && near_edge(pass.a, edges); ++i) pass.a -= 4 * d;
-  for (int i = 0; i < kSteps && near_edge(pass.b, edges); ++i) pass.b += 4 * d;
+  for (int i = 0; i < kEndSteps && near_edge(pass.a, edges); ++i) pass.a -= kEndStep_mm * d;
+  for (int i = 0; i < kEndSteps && near_edge(pass.b, edges); ++i) pass.b += kEndStep_mm * d;
   return pass;
+}
+
+/// All that a pass may come near to once its ends are clear.
+Box2 neighbourhood(const Segment& pass) {
+  Box2 out = bounds({pass.a, pass.b});
+  constexpr double kRoom_mm = kEndSteps * kEndStep_mm + kClear_mm;
+  out.min.array() -= kRoom_mm;
+  out.max.array() += kRoom_mm;
+  return out;
 }
 
 /// The part around a departure, drawn both ways, and the passes that may tell.
@@ -201,16 +220,24 @@ std::vector<Segment> passes_near_end(const Polygon& outline, const Departure& de
   return out;
 }
 
-Views views_of(std::span<const Polygon> members, const Departure& departure) {
+/// Of a part with many members only what the passes come near to is drawn, or else all that is near.
+enum class Drawn : std::uint8_t { AtPasses, Near };
+
+Views views_of(std::span<const Polygon> members, const Departure& departure, Drawn extent) {
   const auto m = static_cast<std::size_t>(departure.member);
   Views out;
   out.near = departure.reach;
   out.near.min.array() -= 5 * kRunUp_mm;
   out.near.max.array() += 5 * kRunUp_mm;
-  out.drawn = edges_near(members, m, members[m], out.near);
-  out.instead = edges_near(members, m, departure.instead, out.near);
   out.passes =
       departure.side >= 0 ? passes_across(members[m], departure) : passes_near_end(members[m], departure);
+  std::vector<Box2> looked_at{out.near};
+  if (extent == Drawn::AtPasses) {
+    looked_at.clear();
+    std::transform(out.passes.begin(), out.passes.end(), std::back_inserter(looked_at), neighbourhood);
+  }
+  out.drawn = edges_near(members, m, members[m], out.near, looked_at);
+  out.instead = edges_near(members, m, departure.instead, out.near, looked_at);
   return out;
 }
 
@@ -351,7 +378,7 @@ int crossings_that_tell(std::span<const VisibleEdge> drawn, std::span<const Visi
 }
 
 std::optional<Segment> telling_pass(std::span<const Polygon> members, const Departure& departure) {
-  const Views views = views_of(members, departure);
+  const Views views = views_of(members, departure, Drawn::AtPasses);
   const std::optional<std::size_t> best = best_pass(views, departure);
   if (!best) return std::nullopt;
   return with_clear_ends(views.passes[*best], views.drawn);
@@ -360,7 +387,7 @@ std::optional<Segment> telling_pass(std::span<const Polygon> members, const Depa
 std::vector<Segment> settling_passes(std::span<const Polygon> members, const Departure& departure,
                                      std::span<const Segment> laid, double off_mm) {
   std::vector<Segment> out;
-  const Views views = views_of(members, departure);
+  const Views views = views_of(members, departure, Drawn::Near);
   const std::optional<std::size_t> best = best_pass(views, departure);
   if (!best) return out;
   const Places told = told_by(views, laid, off_mm);
