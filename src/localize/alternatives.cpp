@@ -43,6 +43,14 @@ bool apart(const Box2& a, const Box2& b) {
   return (a.min.array() > b.max.array()).any() || (b.min.array() > a.max.array()).any();
 }
 
+/// Whether any of a segment lies in a box.
+bool meets(const Segment& s, const Box2& box) {
+  if (apart({s.a.cwiseMin(s.b), s.a.cwiseMax(s.b)}, box)) return false;
+  const Vec2 d = s.b - s.a, half = (box.max - box.min) / 2, from = box.min + half - s.a;
+  const double reach = half.x() * std::abs(d.y()) + half.y() * std::abs(d.x());
+  return std::abs(d.x() * from.y() - d.y() * from.x()) <= reach + 1e-9 * d.squaredNorm();
+}
+
 Box2 grown(const Box2& box, double by) { return {Vec2(box.min.array() - by), Vec2(box.max.array() + by)}; }
 
 Box2 common(const Box2& a, const Box2& b) { return {a.min.cwiseMax(b.min), a.max.cwiseMin(b.max)}; }
@@ -121,9 +129,8 @@ Alternatives::Region Alternatives::inside(const Box2& box) const {
   for (auto s = first_from(box.min.x()); s != spots_.end() && s->place.x() <= box.max.x(); ++s) {
     if (in_box(s->place, box)) out.spots.push_back(*s);
   }
-  std::copy_if(pieces_.begin(), pieces_.end(), std::back_inserter(out.pieces), [&](const Piece& p) {
-    return !apart({p.from.cwiseMin(p.to), p.from.cwiseMax(p.to)}, out.box);
-  });
+  std::copy_if(pieces_.begin(), pieces_.end(), std::back_inserter(out.pieces),
+               [&](const Piece& p) { return meets({p.from, p.to}, out.box); });
   return out;
 }
 
@@ -187,9 +194,8 @@ bool Alternatives::touched(const Box2& box, const Region& region) {
        s != region.spots.end() && s->place.x() <= near_spots.max.x(); ++s) {
     if (in_box(s->place, near_spots)) return true;
   }
-  return std::any_of(region.pieces.begin(), region.pieces.end(), [&](const Piece& p) {
-    return !apart({p.from.cwiseMin(p.to), p.from.cwiseMax(p.to)}, on);
-  });
+  return std::any_of(region.pieces.begin(), region.pieces.end(),
+                     [&](const Piece& p) { return meets({p.from, p.to}, on); });
 }
 
 std::vector<VisibleEdge> Alternatives::edges_within(const Variant& part, const Region& region) const {
