@@ -129,8 +129,11 @@ Alternatives::Region Alternatives::inside(const Box2& box) const {
   for (auto s = first_from(box.min.x()); s != spots_.end() && s->place.x() <= box.max.x(); ++s) {
     if (in_box(s->place, box)) out.spots.push_back(*s);
   }
-  std::copy_if(pieces_.begin(), pieces_.end(), std::back_inserter(out.pieces),
-               [&](const Piece& p) { return meets({p.from, p.to}, out.box); });
+  std::copy_if(pieces_.begin(), pieces_.end(), std::back_inserter(out.pieces), [&](const Piece& p) {
+    return meets({p.from, p.to}, out.box);
+  });
+  for (const Box2& own : boxes_)
+    out.near.push_back(!apart(own, grown(box, kBeyond_mm)) && touched(grown(own, kBeyond_mm), out));
   return out;
 }
 
@@ -166,22 +169,24 @@ int Alternatives::unseen_on(const std::vector<VisibleEdge>& edges, const Region&
   return out;
 }
 
-std::vector<VisibleEdge> Alternatives::visible(const Variant& part, std::size_t member, double joint_gap_mm,
-                                               const Box2& within) const {
+std::vector<VisibleEdge> Alternatives::visible(const Variant& part, std::size_t member,
+                                               const Region& region) const {
   // Only what lies beside a member hides anything of it; the order of the others stays, since it decides who
   // shows a piece that two share.
   if (outline_of(part, member).empty()) return {};
-  const Box2 near = common(grown(box_of(part, member), kBeside_mm), grown(within, kBeyond_mm));
+  const Box2 near = common(grown(box_of(part, member), kBeside_mm), grown(region.box, kBeyond_mm));
   std::vector<Polygon> beside;
   std::size_t own = 0;
   for (std::size_t m = 0; m < members_.size(); ++m) {
-    if (m != member && apart(box_of(part, m), near)) continue;
+    const bool varied = part.outline != nullptr && m == part.member;
+    if (m != member && ((!varied && !region.near.empty() && !region.near[m]) || apart(box_of(part, m), near)))
+      continue;
     const Polygon& outline = outline_of(part, m);
     if (outline.empty()) continue;
     if (m == member) own = beside.size();
     beside.push_back(outline);
   }
-  std::vector<VisibleEdge> out = workpiece::visible_edges(beside, own, joint_gap_mm);
+  std::vector<VisibleEdge> out = workpiece::visible_edges(beside, own, region.joint_gap_mm);
   for (VisibleEdge& edge : out) edge.member = static_cast<int>(member);
   return out;
 }
@@ -194,8 +199,9 @@ bool Alternatives::touched(const Box2& box, const Region& region) {
        s != region.spots.end() && s->place.x() <= near_spots.max.x(); ++s) {
     if (in_box(s->place, near_spots)) return true;
   }
-  return std::any_of(region.pieces.begin(), region.pieces.end(),
-                     [&](const Piece& p) { return meets({p.from, p.to}, on); });
+  return std::any_of(region.pieces.begin(), region.pieces.end(), [&](const Piece& p) {
+    return meets({p.from, p.to}, on);
+  });
 }
 
 std::vector<VisibleEdge> Alternatives::edges_within(const Variant& part, const Region& region) const {
@@ -214,7 +220,7 @@ std::vector<VisibleEdge> Alternatives::edges_within(const Variant& part, const R
     const Box2& own = box_of(part, m);
     if (apart(own, region.box) || outline_of(part, m).empty() || !touched(own, region)) continue;
     if (std::any_of(changed.begin(), changed.end(), [&](const Box2& c) { return !apart(own, c); })) {
-      const std::vector<VisibleEdge> shown = visible(part, m, region.joint_gap_mm, region.box);
+      const std::vector<VisibleEdge> shown = visible(part, m, region);
       std::copy_if(shown.begin(), shown.end(), std::back_inserter(edges), reaches);
     } else {
       const std::vector<VisibleEdge>& shown = drawn(m, region.joint_gap_mm);
@@ -227,7 +233,12 @@ std::vector<VisibleEdge> Alternatives::edges_within(const Variant& part, const R
 const std::vector<VisibleEdge>& Alternatives::drawn(std::size_t member, double joint_gap_mm) const {
   auto& known = drawn_[joint_gap_mm];
   if (known.empty()) known.resize(members_.size());
-  if (!known[member]) known[member] = visible({}, member, joint_gap_mm, kEverywhere);
+  if (!known[member]) {
+    Region all;
+    all.box = kEverywhere;
+    all.joint_gap_mm = joint_gap_mm;
+    known[member] = visible({}, member, all);
+  }
   return *known[member];
 }
 
@@ -408,8 +419,7 @@ void Alternatives::displaced_from(const Polygon& outline, bool anywhere, Region&
   const std::vector<Vote> found = votes(outline, region, anywhere);
   const std::vector<Vec2> axes = axes_of(outline);
   const int bared = bared_by(m, region);
-  const double lost =
-      unseen_[m] > 0 ? unseen_nats_ * unseen_on(visible({}, m, kJointGap_mm, region.box), region) : 0;
+  const double lost = unseen_[m] > 0 ? unseen_nats_ * unseen_on(visible({}, m, region), region) : 0;
 
   struct Trial {
     Vec2 shift;
@@ -436,8 +446,7 @@ void Alternatives::displaced_from(const Polygon& outline, bool anywhere, Region&
     if (trial.shift.norm() < kLeast_mm || most < kHopeless_nats) continue;
     const Polygon moved = shifted(outline, trial.shift);
     const Variant part{m, &moved, bounds(moved)};
-    if (most - unseen_nats_ * unseen_on(visible(part, m, kJointGap_mm, region.box), region) < kHopeless_nats)
-      continue;
+    if (most - unseen_nats_ * unseen_on(visible(part, m, region), region) < kHopeless_nats) continue;
     if (!drawn_known) region.drawn_nats = score({}, region), drawn_known = true;
     double gain = score(part, region) - region.drawn_nats;
     if (gain < kHopeless_nats || gain <= best.gain_nats) continue;

@@ -38,8 +38,8 @@ class Alternatives {
   /// Log-likelihood of a part without the member over the drawing as it is, nats.
   double missing(int member) const;
 
-  /// Whether the scan prefers the drawing as it is, by this many nats or more, to a part that has this outline
-  /// instead of the member's and differs within the box only.
+  /// Whether the scan prefers the drawing as it is, by this many nats or more, to a part that has this
+  /// outline instead of the member's and differs within the box only.
   bool refutes(std::size_t member, const Polygon& instead, const Box2& within, double nats) const;
   /// The members' outlines where the fit has them, frame Part.
   const std::vector<Polygon>& members() const { return members_; }
@@ -81,6 +81,8 @@ class Alternatives {
     double joint_gap_mm = kJointGap_mm;  ///< sides closer than this to another member hide in a joint
     double end_margin_mm = 3;            ///< crossings nearer to an edge's end are not promised
     double drawn_nats = 0;               ///< score of the drawing as it is
+    /// Which members are at anything of it, spot or travel; the others hide nothing there. Empty: all.
+    std::vector<bool> near;
   };
 
   Region around(std::size_t member) const;
@@ -95,14 +97,13 @@ class Alternatives {
   }
   /// Whether anything of the region, spot or travel, is at what lies within a box.
   static bool touched(const Box2& box, const Region& region);
-  /// The edges that lie within the region's box, of members that anything of it touches; beyond it they may
-  /// lack cuts.
+  /// The edges at spots and travel of the region; elsewhere they may lack cuts, or be missing.
   std::vector<workpiece::VisibleEdge> edges_within(const Variant& part, const Region& region) const;
   /// All edges that a member shows on the drawing as fitted.
   const std::vector<workpiece::VisibleEdge>& drawn(std::size_t member, double joint_gap_mm) const;
-  /// The edges that a member shows within a box; beyond it they may lack cuts.
-  std::vector<workpiece::VisibleEdge> visible(const Variant& part, std::size_t member, double joint_gap_mm,
-                                              const Box2& within) const;
+  /// The edges that a member shows at spots and travel of the region; elsewhere they may lack cuts.
+  std::vector<workpiece::VisibleEdge> visible(const Variant& part, std::size_t member,
+                                              const Region& region) const;
   double explained_nats(const std::vector<workpiece::VisibleEdge>& edges, const Region& region) const;
   double score(const Variant& part, const Region& region) const;
   /// What `score` has credited to a variant for closing slots of the drawing that may be too narrow to be

@@ -49,6 +49,11 @@ constexpr double kAsDrawnBetOfThree = 0.9;
 
 /// An answer so far behind the best changes no digit of a sum.
 constexpr double kNoDigit_nats = 45;
+/// Beyond a scale so far behind the best the evidence only falls: what members say of a scale has one best
+/// one, but for little.
+constexpr double kHopeless_nats = 60;
+/// The scale to begin with: parts of many members, for which it matters, are often nearly as drawn.
+constexpr std::size_t kFirstScale = 2;
 /// A share too small to matter in any sum.
 constexpr double kNoShare = 1e-7;
 
@@ -57,6 +62,15 @@ double log_sum(const std::vector<double>& logs) {
   double sum = 0;
   for (const double log : logs) sum += std::exp(log - best);
   return best + std::log(sum);
+}
+
+/// Visits scales from the first one outwards, in either direction for as long as visit() says so.
+template <typename Visit>
+void outwards(std::size_t scales, const Visit& visit) {
+  const std::size_t first = std::min(kFirstScale, scales - 1);
+  visit(first);
+  for (std::size_t i = first + 1; i < scales && visit(i); ++i) continue;
+  for (std::size_t i = first; i > 0 && visit(i - 1); --i) continue;
 }
 
 }  // namespace
@@ -69,12 +83,16 @@ void NormalEquations::clear() {
 }
 
 void NormalEquations::add(int member, const Row& row, double weight) {
-  double* s = sums_[static_cast<std::size_t>(member)].data();
-  const double f[6] = {row.a.x(), row.a.y(), row.a.z(), row.l, row.b, row.residual};
-  for (int j = 0; j < 6; ++j) {
-    const double wf = weight * f[j];
-    for (int i = 0; i <= j; ++i) s[j * 6 + i] += wf * f[i];
-  }
+  Sums& sums = sums_[static_cast<std::size_t>(member)];
+  Eigen::Matrix<double, 6, 1> f;
+  f << row.a, row.l, row.b, row.residual;
+  // The upper triangle counts; of the lower one what comes with it in pairs.
+  sums.col(0).head<2>() += weight * f(0) * f.head<2>();
+  sums.col(1).head<2>() += weight * f(1) * f.head<2>();
+  sums.col(2).head<4>() += weight * f(2) * f.head<4>();
+  sums.col(3).head<4>() += weight * f(3) * f.head<4>();
+  sums.col(4) += weight * f(4) * f;
+  sums.col(5) += weight * f(5) * f;
 }
 
 Common NormalEquations::solve_rigid() const {
@@ -93,8 +111,8 @@ NormalEquations::Block NormalEquations::block(std::size_t member) const {
   Eigen::Matrix3d to_member = Eigen::Matrix3d::Identity();
   to_member(2, 0) = m.y();
   to_member(2, 1) = -m.x();
-  return {to_member * full.topLeftCorner<3, 3>() * to_member.transpose(),
-          to_member * full.topLeftCorner<3, 5>(), to_member * full.topRightCorner<3, 1>()};
+  const Eigen::Matrix<double, 3, 6> cross = to_member * full.topRows<3>();
+  return {cross.leftCols<3>() * to_member.transpose(), cross};
 }
 
 Eigen::Vector3d NormalEquations::prior_sigma(double k, bool free_member) const {
@@ -102,92 +120,79 @@ Eigen::Vector3d NormalEquations::prior_sigma(double k, bool free_member) const {
   return {k * priors_.member_shift_mm, k * priors_.member_shift_mm, k * priors_.member_angle_rad};
 }
 
-NormalEquations::Reduced& NormalEquations::Reduced::operator+=(const Reduced& other) {
-  normal += other.normal;
-  right += other.right;
-  square += other.square;
-  log_determinant += other.log_determinant;
-  return *this;
-}
-
-NormalEquations::Reduced& NormalEquations::Reduced::operator-=(const Reduced& other) {
-  normal -= other.normal;
-  right -= other.right;
-  square -= other.square;
-  log_determinant -= other.log_determinant;
-  return *this;
-}
-
-NormalEquations::Reduced NormalEquations::reduced(std::size_t member, double k, bool free_member,
-                                                  const Block& block, Eigen::Matrix3d& posterior) const {
-  const Sums& sums = sums_[member];
+Eigen::Matrix3d NormalEquations::posterior(std::size_t member, double k, bool free_member, const Block& block,
+                                           double& log_determinant) const {
   const Eigen::Vector3d sigma = prior_sigma(k, free_member);
+  log_determinant = 0;
+  if (!touches(member)) return sigma.cwiseAbs2().asDiagonal();
+  if (k <= 0 && !free_member) return Eigen::Matrix3d::Zero();
+  // S^1/2 (I + S^1/2 G S^1/2)^-1 S^1/2: no division by a prior that may be tiny.
+  const Eigen::Matrix3d both = sigma * sigma.transpose();
+  const Eigen::Matrix3d inner = Eigen::Matrix3d::Identity() + block.gram.cwiseProduct(both);
+  log_determinant = std::log(inner.determinant());
+  return inner.inverse().cwiseProduct(both);
+}
+
+void NormalEquations::eliminate(std::size_t member, double k, bool free_member, const Block& block, int sign,
+                                Reduced& left) const {
+  if (!touches(member) || (k <= 0 && !free_member)) return;
+  double log_determinant = 0;
+  const Eigen::Matrix3d own = posterior(member, k, free_member, block, log_determinant);
+  const Eigen::Matrix<double, 3, 6> carry = sign * own * block.cross;
+  left.sums.noalias() -= block.cross.transpose() * carry;
+  left.log_determinant += sign * log_determinant;
+}
+
+/// Members as drawn.
+NormalEquations::Reduced NormalEquations::rigid() const {
   Reduced out;
-  if (!touches(member)) {
-    posterior = sigma.cwiseAbs2().asDiagonal();
-    return out;
-  }
-  out.normal = sums.topLeftCorner<5, 5>().selfadjointView<Eigen::Upper>();
-  out.right = sums.topRightCorner<5, 1>();
-  out.square = sums(5, 5);
-  if (k <= 0 && !free_member) {
-    posterior.setZero();
-    return out;
-  }
-  // Posterior covariance S^1/2 (I + S^1/2 G S^1/2)^-1 S^1/2: no division by a prior that may be tiny.
-  const Eigen::Matrix3d inner =
-      Eigen::Matrix3d::Identity() + sigma.asDiagonal() * block.gram * sigma.asDiagonal();
-  posterior = sigma.asDiagonal() * inner.inverse() * sigma.asDiagonal();
-  const Eigen::Matrix<double, 3, 5> carry = posterior * block.cross;
-  out.log_determinant = std::log(inner.determinant());
-  out.normal -= block.cross.transpose() * carry;
-  out.right -= carry.transpose() * block.right;
-  out.square -= block.right.dot(posterior * block.right);
+  for (const Sums& sums : sums_) out.sums += sums;
+  out.sums = Sums(out.sums.selfadjointView<Eigen::Upper>());
   return out;
 }
 
-NormalEquations::Reduced NormalEquations::common_prior(double latency_ms) const {
-  Reduced out;
+void NormalEquations::add_prior(double latency_ms, Reduced& left) const {
   Priors priors = priors_;
   priors.latency_ms = latency_ms;
-  out.normal = prior_information(priors);
-  out.log_determinant = -std::log(precision(priors.latency_ms)) - std::log(precision(priors.inset_mm));
-  return out;
+  left.sums.topLeftCorner<5, 5>() += prior_information(priors);
+  left.log_determinant -= std::log(precision(priors.latency_ms)) + std::log(precision(priors.inset_mm));
 }
 
 double NormalEquations::evidence_of(const Reduced& total) const {
-  const Eigen::LDLT<CommonMatrix> factor(total.normal);
+  const Eigen::LDLT<CommonMatrix> factor(total.normal());
   const double log_determinant = total.log_determinant + factor.vectorD().cwiseAbs().array().log().sum();
-  return -0.5 * (log_determinant + total.square - total.right.dot(factor.solve(total.right)));
+  return -0.5 * (log_determinant + total.square() - total.right().dot(factor.solve(total.right())));
 }
 
 std::vector<NormalEquations::Block> NormalEquations::blocks() const {
   std::vector<Block> out(sums_.size());
   for (std::size_t m = 0; m < sums_.size(); ++m) {
-    if (touches(m)) {
-      out[m] = block(m);
-    } else {
-      out[m] = {Eigen::Matrix3d::Zero(), Eigen::Matrix<double, 3, 5>::Zero(), Eigen::Vector3d::Zero()};
-    }
+    if (touches(m)) out[m] = block(m);
   }
   return out;
 }
 
 std::vector<Solution> NormalEquations::solve_common(double k, const std::vector<bool>& free_members,
                                                     const std::vector<double>& latencies_ms,
-                                                    const std::vector<Block>& blocks,
-                                                    std::vector<Eigen::Matrix3d>& posterior) const {
-  Reduced seen;
-  posterior.resize(sums_.size());
-  for (std::size_t m = 0; m < sums_.size(); ++m)
-    seen += reduced(m, k, free_members[m], blocks[m], posterior[m]);
+                                                    const std::vector<Block>& blocks, const Reduced& rigid,
+                                                    std::vector<Own>& own) const {
+  Reduced left = rigid;
+  own.resize(sums_.size());
+  for (std::size_t m = 0; m < sums_.size(); ++m) {
+    double log_determinant = 0;
+    own[m].posterior = posterior(m, k, free_members[m], blocks[m], log_determinant);
+    if (!touches(m) || log_determinant == 0) continue;
+    own[m].carry.noalias() = own[m].posterior * blocks[m].cross;
+    left.sums.noalias() -= blocks[m].cross.transpose() * own[m].carry;
+    left.log_determinant += log_determinant;
+  }
   std::vector<Solution> out;
   for (const double latency_ms : latencies_ms) {
-    Reduced total = common_prior(latency_ms);
-    total += seen;
+    Reduced total = left;
+    add_prior(latency_ms, total);
     Solution one;
-    const Eigen::LDLT<CommonMatrix> factor(total.normal);
-    one.common = factor.solve(total.right);
+    const Eigen::LDLT<CommonMatrix> factor(total.normal());
+    one.common = factor.solve(total.right());
     one.covariance = factor.solve(CommonMatrix::Identity());
     one.log_evidence = evidence_of(total);
     one.members.resize(sums_.size());
@@ -196,23 +201,22 @@ std::vector<Solution> NormalEquations::solve_common(double k, const std::vector<
   return out;
 }
 
-void NormalEquations::solve_members(const std::vector<Block>& blocks,
-                                    const std::vector<Eigen::Matrix3d>& posterior, Solution& solution) const {
+void NormalEquations::solve_members(const std::vector<Own>& own, Detail detail, Solution& solution) const {
   for (std::size_t m = 0; m < sums_.size(); ++m) {
     MemberSolution& member = solution.members[m];
-    member.covariance = posterior[m];
-    if (!touches(m)) continue;
-    const Eigen::Matrix<double, 3, 5> carry = posterior[m] * blocks[m].cross;
-    member.shift = posterior[m] * blocks[m].right - carry * solution.common;
-    member.covariance += carry * solution.covariance * carry.transpose();
+    const auto carry = own[m].carry.leftCols<5>();
+    member.shift = own[m].carry.col(5) - carry * solution.common;
+    if (detail == Detail::Shifts) continue;
+    member.covariance = own[m].posterior;
+    if (touches(m)) member.covariance += carry * solution.covariance * carry.transpose();
   }
 }
 
-Solution NormalEquations::solve(double k, const std::vector<bool>& free_members) const {
-  const std::vector<Block> all = blocks();
-  std::vector<Eigen::Matrix3d> posterior;
-  Solution out = std::move(solve_common(k, free_members, {priors_.latency_ms}, all, posterior).front());
-  solve_members(all, posterior, out);
+Solution NormalEquations::solve(double k, const std::vector<bool>& free_members, Detail detail) const {
+  std::vector<Own> own;
+  Solution out =
+      std::move(solve_common(k, free_members, {priors_.latency_ms}, blocks(), rigid(), own).front());
+  solve_members(own, detail, out);
   return out;
 }
 
@@ -236,65 +240,87 @@ std::vector<NormalEquations::Scale> NormalEquations::scales() const {
 }
 
 std::vector<Weighed> NormalEquations::over_scales(const std::vector<bool>& free_members,
-                                                  const std::vector<double>& latencies_ms) const {
-  std::vector<Weighed> out;
+                                                  const std::vector<double>& latencies_ms,
+                                                  Detail detail) const {
   const std::vector<Block> all = blocks();
+  const Reduced undivided = rigid();
   const std::vector<Scale> each = scales();
-  std::vector<std::vector<Eigen::Matrix3d>> posteriors(each.size());
-  Weighed best{{}, -1e300, -1e300};
-  for (std::size_t i = 0; i < each.size(); ++i) {
-    for (Solution& solution : solve_common(each[i].k, free_members, latencies_ms, all, posteriors[i])) {
-      const double evidence = solution.log_evidence;
-      out.push_back({std::move(solution), evidence + each[i].log_weight, evidence + each[i].log_bet});
-      best.log_weight = std::max(best.log_weight, out.back().log_weight);
-      best.log_bet = std::max(best.log_bet, out.back().log_bet);
+  std::vector<std::vector<Own>> own(each.size());
+  std::vector<std::vector<Solution>> answers(each.size());
+  double best_weight = -1e300, best_bet = -1e300;
+  outwards(each.size(), [&](std::size_t i) {
+    answers[i] = solve_common(each[i].k, free_members, latencies_ms, all, undivided, own[i]);
+    bool matters = false;
+    for (const Solution& solution : answers[i]) {
+      const double weight = solution.log_evidence + each[i].log_weight,
+                   bet = solution.log_evidence + each[i].log_bet;
+      best_weight = std::max(best_weight, weight);
+      best_bet = std::max(best_bet, bet);
+      matters = matters || weight > best_weight - kHopeless_nats || bet > best_bet - kHopeless_nats;
     }
-  }
-  // The members of an answer too unlikely to change any digit are left where they are drawn.
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    if (out[i].log_weight > best.log_weight - kNoDigit_nats || out[i].log_bet > best.log_bet - kNoDigit_nats)
-      solve_members(all, posteriors[i / latencies_ms.size()], out[i].solution);
+    return matters;
+  });
+  std::vector<Weighed> out;
+  for (std::size_t i = 0; i < each.size(); ++i) {
+    for (Solution& solution : answers[i]) {
+      const double weight = solution.log_evidence + each[i].log_weight,
+                   bet = solution.log_evidence + each[i].log_bet;
+      // The members of an answer too unlikely to change any digit are left where they are drawn.
+      if (weight > best_weight - kNoDigit_nats || bet > best_bet - kNoDigit_nats)
+        solve_members(own[i], detail, solution);
+      out.push_back({std::move(solution), weight, bet});
+    }
   }
   return out;
 }
 
 double NormalEquations::evidence(const std::vector<bool>& free_members) const {
-  std::vector<double> each;
+  std::vector<double> logs;
   const std::vector<Block> all = blocks();
-  Eigen::Matrix3d unused;
-  for (const Scale& scale : scales()) {
-    Reduced total = common_prior(priors_.latency_ms);
-    for (std::size_t m = 0; m < sums_.size(); ++m)
-      total += reduced(m, scale.k, free_members[m], all[m], unused);
-    each.push_back(evidence_of(total) + scale.log_weight);
-  }
-  return log_sum(each);
+  const std::vector<Scale> each = scales();
+  Reduced undivided = rigid();
+  add_prior(priors_.latency_ms, undivided);
+  double best = -1e300;
+  outwards(each.size(), [&](std::size_t i) {
+    Reduced left = undivided;
+    for (std::size_t m = 0; m < sums_.size(); ++m) eliminate(m, each[i].k, free_members[m], all[m], 1, left);
+    logs.push_back(evidence_of(left) + each[i].log_weight);
+    best = std::max(best, logs.back());
+    return logs.back() > best - kHopeless_nats;
+  });
+  return log_sum(logs);
 }
 
 std::vector<double> NormalEquations::evidence_turned(const std::vector<bool>& free_members,
                                                      const std::vector<std::size_t>& members,
                                                      const std::vector<double>& latencies_ms) const {
   const std::vector<Block> all = blocks();
-  std::vector<std::vector<double>> each(members.size());
-  Eigen::Matrix3d unused;
-  for (const Scale& scale : scales()) {
-    Reduced seen;
+  const std::vector<Scale> each = scales();
+  const Reduced undivided = rigid();
+  std::vector<std::vector<double>> logs(members.size());
+  std::vector<double> best(members.size(), -1e300);
+  outwards(each.size(), [&](std::size_t scale) {
+    Reduced held = undivided;
     for (std::size_t m = 0; m < sums_.size(); ++m)
-      seen += reduced(m, scale.k, free_members[m], all[m], unused);
+      eliminate(m, each[scale].k, free_members[m], all[m], 1, held);
+    bool matters = false;
     for (std::size_t i = 0; i < members.size(); ++i) {
       const std::size_t m = members[i];
-      Reduced turned = seen;
-      turned -= reduced(m, scale.k, free_members[m], all[m], unused);
-      turned += reduced(m, scale.k, !free_members[m], all[m], unused);
+      Reduced turned = held;
+      eliminate(m, each[scale].k, free_members[m], all[m], -1, turned);
+      eliminate(m, each[scale].k, !free_members[m], all[m], 1, turned);
       for (const double latency_ms : latencies_ms) {
-        Reduced total = common_prior(latency_ms);
-        total += turned;
-        each[i].push_back(evidence_of(total) + scale.log_weight);
+        Reduced total = turned;
+        add_prior(latency_ms, total);
+        logs[i].push_back(evidence_of(total) + each[scale].log_weight);
+        best[i] = std::max(best[i], logs[i].back());
+        matters = matters || logs[i].back() > best[i] - kHopeless_nats;
       }
     }
-  }
+    return matters;
+  });
   std::vector<double> out;
-  for (const std::vector<double>& logs : each) out.push_back(log_sum(logs));
+  for (const std::vector<double>& one : logs) out.push_back(log_sum(one));
   return out;
 }
 
@@ -343,7 +369,7 @@ MemberSolution NormalEquations::unshrunk(std::size_t member, const Common& commo
       Eigen::Matrix3d::Identity() + sigma.asDiagonal() * b.gram * sigma.asDiagonal();
   MemberSolution out;
   out.covariance = sigma.asDiagonal() * inner.inverse() * sigma.asDiagonal();
-  out.shift = out.covariance * (b.right - b.cross * common);
+  out.shift = out.covariance * (b.cross.col(5) - b.cross.leftCols<5>() * common);
   return out;
 }
 

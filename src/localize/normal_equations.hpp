@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "fit.hpp"
@@ -43,6 +44,9 @@ Solution mean_of(const std::vector<Weighed>& each);
 /// The same about a given estimate (its `common` and the members' shifts).
 Solution about(const std::vector<Weighed>& each, const Solution& estimate);
 
+/// Whether a solution holds the members' covariances as well, or their shifts only.
+enum class Detail : std::uint8_t { Shifts, All };
+
 class NormalEquations {
  public:
   /// member_centroids about the template's centroid.
@@ -55,11 +59,12 @@ class NormalEquations {
   /// Common parameters alone, members rigid.
   Common solve_rigid() const;
   /// With member shifts of prior k * tolerance; members flagged free have a wide prior instead. k = 0: rigid.
-  Solution solve(double k, const std::vector<bool>& free_members) const;
+  Solution solve(double k, const std::vector<bool>& free_members, Detail detail = Detail::All) const;
   /// One answer for each scale k and each prior of the latency, weighed by its evidence and the prior of the
-  /// scales.
+  /// scales; none for scales too unlikely to change any digit.
   std::vector<Weighed> over_scales(const std::vector<bool>& free_members,
-                                   const std::vector<double>& latencies_ms) const;
+                                   const std::vector<double>& latencies_ms,
+                                   Detail detail = Detail::All) const;
   /// Log-evidence over all scales.
   double evidence(const std::vector<bool>& free_members) const;
   /// The same over the priors of the latency with the flag of one member turned, for each of the members
@@ -72,35 +77,44 @@ class NormalEquations {
 
  private:
   using Sums = Eigen::Matrix<double, 6, 6>;  ///< of (a, l, b, residual)
+  /// What a member's shift shares with itself and with all else, about the member's centroid.
   struct Block {
-    Eigen::Matrix3d gram;
-    Eigen::Matrix<double, 3, 5> cross;
-    Eigen::Vector3d right;
+    Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
+    Eigen::Matrix<double, 3, 6> cross = Eigen::Matrix<double, 3, 6>::Zero();  ///< with (a, l, b, residual)
   };
-  /// What members leave to the common parameters once their own shifts are eliminated.
+  /// What is left to the common parameters once the members' own shifts are eliminated.
   struct Reduced {
-    CommonMatrix normal = CommonMatrix::Zero();
-    Common right = Common::Zero();
-    double square = 0, log_determinant = 0;
-    Reduced& operator+=(const Reduced& other);
-    Reduced& operator-=(const Reduced& other);
+    Sums sums = Sums::Zero();
+    double log_determinant = 0;
+    CommonMatrix normal() const { return sums.topLeftCorner<5, 5>(); }
+    Common right() const { return sums.topRightCorner<5, 1>(); }
+    double square() const { return sums(5, 5); }
   };
   struct Scale;
+  /// A member's shift given the common parameters: its covariance, and how it follows from (a, l, b) and from
+  /// the residuals.
+  struct Own {
+    Eigen::Matrix3d posterior = Eigen::Matrix3d::Zero();
+    Eigen::Matrix<double, 3, 6> carry = Eigen::Matrix<double, 3, 6>::Zero();
+  };
   Block block(std::size_t member) const;
   Eigen::Vector3d prior_sigma(double k, bool free_member) const;
-  /// Covariance of a member's shift given the common parameters, and what the member then leaves.
-  Reduced reduced(std::size_t member, double k, bool free_member, const Block& block,
-                  Eigen::Matrix3d& posterior) const;
-  Reduced common_prior(double latency_ms) const;
+  /// Covariance of a member's shift given the common parameters.
+  Eigen::Matrix3d posterior(std::size_t member, double k, bool free_member, const Block& block,
+                            double& log_determinant) const;
+  /// Takes a member's own shift out of what is left (sign 1), or puts it back (-1).
+  void eliminate(std::size_t member, double k, bool free_member, const Block& block, int sign,
+                 Reduced& left) const;
+  Reduced rigid() const;
+  void add_prior(double latency_ms, Reduced& left) const;
   std::vector<Block> blocks() const;
   double evidence_of(const Reduced& total) const;
   /// The common parameters of one scale for each prior of the latency, and what the members know beside them.
   std::vector<Solution> solve_common(double k, const std::vector<bool>& free_members,
                                      const std::vector<double>& latencies_ms,
-                                     const std::vector<Block>& blocks,
-                                     std::vector<Eigen::Matrix3d>& posterior) const;
-  void solve_members(const std::vector<Block>& blocks, const std::vector<Eigen::Matrix3d>& posterior,
-                     Solution& solution) const;
+                                     const std::vector<Block>& blocks, const Reduced& rigid,
+                                     std::vector<Own>& own) const;
+  void solve_members(const std::vector<Own>& own, Detail detail, Solution& solution) const;
   std::vector<Scale> scales() const;
 
   std::vector<Vec2> centroids_;

@@ -22,6 +22,7 @@ constexpr double kWideLatency_nats = 2;
 constexpr double kTellsMembers_nats = 7;
 /// So many crossings, evenly taken, tell which members are off and how far sigmas can be believed.
 constexpr std::size_t kSettlePoints = 600;
+constexpr int kSteps = 4;
 
 /// The loop of refine(): matches, weights, sums, solution, over and over.
 class Refinement {
@@ -62,7 +63,7 @@ class Refinement {
     fit_.member_covariance = coarse.fit_.member_covariance;
   }
   Fit run() {
-    for (int step = 0; step < 4; ++step) iterate(step);
+    for (int step = 0; step < kSteps; ++step) iterate(step);
     weigh_other_members();
     finish();
     return std::move(fit_);
@@ -118,7 +119,8 @@ class Refinement {
       place();
       equations.clear();
       weigh_geman_mcclure(equations, scale);
-      take(equations.solve(1, free_));
+      const Detail detail = scale > 2 ? Detail::Shifts : Detail::All;
+      take(equations.solve(1, free_, detail), detail);
     }
     const double shift = std::max(priors_.member_shift_mm, 0.2),
                  angle = std::max(priors_.member_angle_rad, 0.001);
@@ -197,7 +199,7 @@ class Refinement {
 
   /// The three members that strain most at a tight tolerance.
   std::vector<std::size_t> most_displaced(const NormalEquations& equations) const {
-    const Solution tight = equations.solve(0.5, free_);
+    const Solution tight = equations.solve(0.5, free_, Detail::Shifts);
     std::vector<std::pair<double, std::size_t>> strain;
     for (std::size_t m = 0; m < free_.size(); ++m) {
       const MemberShift& u = tight.members[m].shift;
@@ -216,7 +218,8 @@ class Refinement {
     place();
     NormalEquations equations(fields_.member_centroids(), priors_);
     weigh_mixture(equations);
-    take(mean_of(answers(equations, free_)));
+    const Detail detail = step + 1 < kSteps ? Detail::Shifts : Detail::All;
+    take(mean_of(answers(equations, free_, detail)), detail);
     if (step == 1 || step == 2) rescale();
   }
 
@@ -229,10 +232,10 @@ class Refinement {
 
   /// Over scales and latencies. Where a scan tells a latency from a turn by little the stated prior, which
   /// bends the pose when it is wrong, must be the likelier one by more than the charge alone.
-  std::vector<Weighed> answers(const NormalEquations& equations,
-                               const std::vector<bool>& free_members) const {
+  std::vector<Weighed> answers(const NormalEquations& equations, const std::vector<bool>& free_members,
+                               Detail detail = Detail::All) const {
     const std::vector<double> latencies = latencies_ms();
-    std::vector<Weighed> out = equations.over_scales(free_members, latencies);
+    std::vector<Weighed> out = equations.over_scales(free_members, latencies, detail);
     for (std::size_t i = 1; latencies.size() == 2 && i < out.size(); i += 2) {
       out[i].log_weight += kWideLatency_nats;
       out[i].log_bet += kWideLatency_nats;
@@ -275,7 +278,7 @@ class Refinement {
   }
 
   /// What a solution leads to from here.
-  Estimate after(const Solution& solution) const {
+  Estimate after(const Solution& solution, Detail detail = Detail::All) const {
     Estimate out = fit_;
     move(out.state.pose, solution.common);
     out.state.latency_ms = solution.common(3);
@@ -284,7 +287,7 @@ class Refinement {
     out.chances = solution.chances;
     for (std::size_t m = 0; m < free_.size(); ++m) {
       out.state.members[m] = solution.members[m].shift;
-      out.member_covariance[m] = solution.members[m].covariance;
+      if (detail == Detail::All) out.member_covariance[m] = solution.members[m].covariance;
     }
     return out;
   }
@@ -302,9 +305,9 @@ class Refinement {
     fit_.scale = std::max(1.0, std::sqrt(sum / std::max(1.0, count - 5)));
   }
 
-  void take(const Solution& solution) {
+  void take(const Solution& solution, Detail detail = Detail::All) {
     if (!solution.common.allFinite()) return;
-    static_cast<Estimate&>(fit_) = after(solution);
+    static_cast<Estimate&>(fit_) = after(solution, detail);
     ++fit_.iterations;
   }
 

@@ -140,24 +140,22 @@ bool apart(const Box2& a, const Box2& b) {
   return (a.min.array() > b.max.array()).any() || (b.min.array() > a.max.array()).any();
 }
 
-/// Edges that the members show near the box, one of them with another outline; farther off they may lack
-/// cuts. Of members that meet none of the boxes looked at there are none.
+/// Edges that the members show near the box, one of them with another outline, and in any of the boxes looked
+/// at; elsewhere they may lack cuts, or be missing.
 std::vector<VisibleEdge> edges_near(std::span<const Polygon> members, std::size_t member,
                                     const Polygon& outline, const Box2& box,
                                     std::span<const Box2> looked_at) {
   std::vector<Polygon> beside;  // in their order, which decides who shows a piece that two share
-  std::vector<std::size_t> asked;
   for (std::size_t m = 0; m < members.size(); ++m) {
     const Polygon& one = m == member ? outline : members[m];
     if (one.empty()) continue;
     const Box2 own = bounds(one);
-    if (apart(own, box)) continue;
-    if (std::any_of(looked_at.begin(), looked_at.end(), [&](const Box2& b) { return !apart(own, b); }))
-      asked.push_back(beside.size());
-    beside.push_back(one);
+    if (!apart(own, box) &&
+        std::any_of(looked_at.begin(), looked_at.end(), [&](const Box2& b) { return !apart(own, b); }))
+      beside.push_back(one);
   }
   std::vector<VisibleEdge> out;
-  for (const std::size_t m : asked) {
+  for (std::size_t m = 0; m < beside.size(); ++m) {
     for (const VisibleEdge& edge : visible_edges(beside, m, kClosed_mm)) out.push_back(edge);
   }
   return out;
