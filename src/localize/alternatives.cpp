@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 
 namespace weldcell::localize {
 
@@ -132,9 +133,23 @@ Alternatives::Region Alternatives::inside(const Box2& box) const {
   std::copy_if(pieces_.begin(), pieces_.end(), std::back_inserter(out.pieces), [&](const Piece& p) {
     return meets({p.from, p.to}, out.box);
   });
-  for (const Box2& own : boxes_)
-    out.near.push_back(!apart(own, grown(box, kBeyond_mm)) && touched(grown(own, kBeyond_mm), out));
   return out;
+}
+
+Alternatives::Region Alternatives::everywhere() const {
+  Region out;
+  out.box = kEverywhere;
+  out.near.resize(members_.size());
+  std::iota(out.near.begin(), out.near.end(), std::size_t{0});
+  return out;
+}
+
+void Alternatives::note_near(std::size_t member, Region& region) const {
+  const Box2 reach = grown(region.box, kBeyond_mm);
+  for (std::size_t m = 0; m < members_.size(); ++m) {
+    if (m == member || (!apart(boxes_[m], reach) && touched(grown(boxes_[m], kBeyond_mm), region)))
+      region.near.push_back(m);
+  }
 }
 
 std::vector<Alternatives::Spot>::const_iterator Alternatives::first_from(double x) const {
@@ -177,10 +192,8 @@ std::vector<VisibleEdge> Alternatives::visible(const Variant& part, std::size_t 
   const Box2 near = common(grown(box_of(part, member), kBeside_mm), grown(region.box, kBeyond_mm));
   std::vector<Polygon> beside;
   std::size_t own = 0;
-  for (std::size_t m = 0; m < members_.size(); ++m) {
-    const bool varied = part.outline != nullptr && m == part.member;
-    if (m != member && ((!varied && !region.near.empty() && !region.near[m]) || apart(box_of(part, m), near)))
-      continue;
+  for (const std::size_t m : region.near) {
+    if (m != member && apart(box_of(part, m), near)) continue;
     const Polygon& outline = outline_of(part, m);
     if (outline.empty()) continue;
     if (m == member) own = beside.size();
@@ -216,7 +229,7 @@ std::vector<VisibleEdge> Alternatives::edges_within(const Variant& part, const R
     return !apart({e.line.a.cwiseMin(e.line.b), e.line.a.cwiseMax(e.line.b)}, reached);
   };
   std::vector<VisibleEdge> edges;
-  for (std::size_t m = 0; m < members_.size(); ++m) {
+  for (const std::size_t m : region.near) {
     const Box2& own = box_of(part, m);
     if (apart(own, region.box) || outline_of(part, m).empty() || !touched(own, region)) continue;
     if (std::any_of(changed.begin(), changed.end(), [&](const Box2& c) { return !apart(own, c); })) {
@@ -234,8 +247,7 @@ const std::vector<VisibleEdge>& Alternatives::drawn(std::size_t member, double j
   auto& known = drawn_[joint_gap_mm];
   if (known.empty()) known.resize(members_.size());
   if (!known[member]) {
-    Region all;
-    all.box = kEverywhere;
+    Region all = everywhere();
     all.joint_gap_mm = joint_gap_mm;
     known[member] = visible({}, member, all);
   }
@@ -281,8 +293,7 @@ double Alternatives::slots_nats(const Variant& part, Region region) const {
 }
 
 double Alternatives::whole() const {
-  Region all;
-  all.box = kEverywhere;
+  Region all = everywhere();
   all.spots = spots_;
   return explained_nats(edges_within({}, all), all);
 }
@@ -290,6 +301,7 @@ double Alternatives::whole() const {
 bool Alternatives::refutes(std::size_t member, const Polygon& instead, const Box2& within,
                            double nats) const {
   Region region = inside(grown(within, kSeenAt_mm));
+  note_near(member, region);
   region.end_margin_mm = kLeastEndMargin_mm;
   const Variant drawn, other{member, &instead, bounds(instead)};
   // A point may lie on a side that a narrow slot shows; nobody has to have seen one there.
@@ -319,7 +331,8 @@ double Alternatives::places_nats() const {
 
 double Alternatives::missing(int member) const {
   const auto m = static_cast<std::size_t>(member);
-  const Region region = around(m);
+  Region region = around(m);
+  note_near(m, region);
   const Polygon nothing;
   return score({m, &nothing, boxes_[m]}, region) - score({}, region);
 }
@@ -406,6 +419,7 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
   const bool idle =
       std::none_of(region.spots.begin(), region.spots.end(), [](const Spot& s) { return s.free; });
   if (idle && unseen_[m] == 0) return best;
+  note_near(m, region);
   displaced_from(members_[m], anywhere, region, best);
   // A fit that followed a displaced member half the way has turned it as well.
   if (anywhere) displaced_from(outlines_[m], anywhere, region, best);

@@ -81,12 +81,15 @@ class Alternatives {
     double joint_gap_mm = kJointGap_mm;  ///< sides closer than this to another member hide in a joint
     double end_margin_mm = 3;            ///< crossings nearer to an edge's end are not promised
     double drawn_nats = 0;               ///< score of the drawing as it is
-    /// Which members are at anything of it, spot or travel; the others hide nothing there. Empty: all.
-    std::vector<bool> near;
+    /// Members at anything of it, spot or travel, in order: the others neither show nor hide anything there.
+    std::vector<std::size_t> near;
   };
 
   Region around(std::size_t member) const;
   Region inside(const Box2& box) const;
+  Region everywhere() const;
+  /// Notes which members are near, and the given one in any case.
+  void note_near(std::size_t member, Region& region) const;
   /// The first of spots_ at x or beyond.
   std::vector<Spot>::const_iterator first_from(double x) const;
   const Polygon& outline_of(const Variant& part, std::size_t member) const {
