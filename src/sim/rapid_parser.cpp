@@ -1,6 +1,7 @@
 #include <optional>
 #include <set>
 
+#include "sim/rapid_expression.hpp"
 #include "sim/rapid_lexer.hpp"
 #include "sim/rapid_syntax.hpp"
 
@@ -8,14 +9,10 @@ namespace weldcell::sim::rapid {
 
 namespace {
 
-struct SyntaxFault {
-  int line;
-  std::string what;
-};
-
-class Parser {
+class Parser : ExpressionParser {
  public:
-  Parser(std::vector<Token> tokens, const TypeTable& types) : tokens_(std::move(tokens)), types_(types) {}
+  Parser(std::vector<Token> tokens, const TypeTable& types)
+      : ExpressionParser(std::move(tokens)), types_(types) {}
 
   std::shared_ptr<Module> module() {
     auto out = std::make_shared<Module>();
@@ -35,40 +32,6 @@ class Parser {
   }
 
  private:
-  // ---- tokens ----
-  const Token& here() const { return tokens_[at_]; }
-  void next() {
-    if (here().kind != Token::Kind::End) ++at_;
-  }
-  [[noreturn]] void fail(const std::string& what) const { throw SyntaxFault{here().line, what}; }
-  std::string shown() const {
-    return here().kind == Token::Kind::End ? "end of file" : "'" + here().text + "'";
-  }
-  bool is(const char* symbol) const { return here().kind == Token::Kind::Symbol && here().word == symbol; }
-  bool is_word(const char* word) const {
-    return here().kind == Token::Kind::Identifier && here().word == word;
-  }
-  bool take(const char* symbol) { return is(symbol) ? (next(), true) : false; }
-  bool take_word(const char* word) { return is_word(word) ? (next(), true) : false; }
-  void expect(const char* symbol) {
-    if (!take(symbol)) fail("'" + std::string(symbol) + "' expected, not " + shown());
-  }
-  void expect_word(const char* word) {
-    if (!take_word(word)) fail(std::string(word) + " expected, not " + shown());
-  }
-  std::pair<std::string, std::string> identifier(const char* what) {
-    if (here().kind != Token::Kind::Identifier) fail(std::string(what) + " expected, not " + shown());
-    std::pair<std::string, std::string> out{here().word, here().text};
-    next();
-    return out;
-  }
-  bool any_word(std::initializer_list<const char*> words) const {
-    for (const char* word : words) {
-      if (is_word(word)) return true;
-    }
-    return false;
-  }
-
   // ---- module level ----
   void module_item() {
     if (here().kind == Token::Kind::End) fail("ENDMODULE expected");
@@ -317,162 +280,8 @@ class Parser {
     return out;
   }
 
-  std::vector<Argument> arguments(const char* end) {
-    std::vector<Argument> out;
-    bool separated = true;
-    while (!is(end)) {
-      if (take("\\")) {
-        Argument argument;
-        argument.option = identifier("option").first;
-        if (take(":=")) argument.value = expression();
-        out.push_back(std::move(argument));
-        take(",");
-        separated = true;
-        continue;
-      }
-      if (!separated) fail("',' or ';' expected, not " + shown());
-      out.push_back({"", expression()});
-      separated = take(",");
-      if (separated && is(end)) fail("argument expected after ','");
-    }
-    return out;
-  }
-
-  // ---- expressions ----
-  ExpressionPtr node(Expression::Kind kind, std::string name = "") {
-    auto out = std::make_unique<Expression>();
-    out->kind = kind;
-    out->name = std::move(name);
-    return out;
-  }
-  ExpressionPtr binary(ExpressionPtr left, std::string name, ExpressionPtr right) {
-    ExpressionPtr out = node(Expression::Kind::Binary, std::move(name));
-    out->operands.push_back(std::move(left));
-    out->operands.push_back(std::move(right));
-    return out;
-  }
-
-  /// The operator here when it is one of this level, consumed.
-  std::optional<std::string> operator_of(std::initializer_list<const char*> names) {
-    for (const char* name : names) {
-      const bool word = std::isalpha(static_cast<unsigned char>(name[0])) != 0;
-      if (word ? is_word(name) : is(name)) {
-        next();
-        return name;
-      }
-    }
-    return std::nullopt;
-  }
-
-  ExpressionPtr expression() {
-    if (++depth_ > 50) fail("nested too deep");
-    ExpressionPtr left = conjunction();
-    while (const auto name = operator_of({"or", "xor"})) left = binary(std::move(left), *name, conjunction());
-    --depth_;
-    return left;
-  }
-  ExpressionPtr conjunction() {
-    ExpressionPtr left = negation();
-    while (operator_of({"and"})) left = binary(std::move(left), "and", negation());
-    return left;
-  }
-  ExpressionPtr negation() {
-    if (!take_word("not")) return relation();
-    ExpressionPtr out = node(Expression::Kind::Unary, "not");
-    out->operands.push_back(negation());
-    return out;
-  }
-  ExpressionPtr relation() {
-    ExpressionPtr left = sum();
-    if (const auto name = operator_of({"=", "<>", "<=", ">=", "<", ">"}))
-      left = binary(std::move(left), *name, sum());
-    return left;
-  }
-  ExpressionPtr sum() {
-    ExpressionPtr left = term();
-    while (const auto name = operator_of({"+", "-"})) left = binary(std::move(left), *name, term());
-    return left;
-  }
-  ExpressionPtr term() {
-    ExpressionPtr left = factor();
-    while (const auto name = operator_of({"*", "/", "div", "mod"}))
-      left = binary(std::move(left), *name, factor());
-    return left;
-  }
-  ExpressionPtr factor() {
-    if (take("-")) {
-      ExpressionPtr out = node(Expression::Kind::Unary, "-");
-      out->operands.push_back(factor());
-      return out;
-    }
-    if (take("+")) return factor();
-    return primary();
-  }
-
-  ExpressionPtr primary() {
-    if (here().kind == Token::Kind::Number) {
-      ExpressionPtr out = node(Expression::Kind::Literal);
-      out->literal = Value::of(here().number);
-      next();
-      return out;
-    }
-    if (here().kind == Token::Kind::Text) {
-      ExpressionPtr out = node(Expression::Kind::Literal);
-      out->literal = Value::of(here().text);
-      next();
-      return out;
-    }
-    if (any_word({"true", "false"})) {
-      ExpressionPtr out = node(Expression::Kind::Literal);
-      out->literal = Value::of(is_word("true"));
-      next();
-      return out;
-    }
-    if (take("(")) {
-      ExpressionPtr out = expression();
-      expect(")");
-      return out;
-    }
-    if (take("[")) {
-      ExpressionPtr out = node(Expression::Kind::Aggregate);
-      do {
-        out->operands.push_back(expression());
-      } while (take(","));
-      expect("]");
-      return out;
-    }
-    return reference();
-  }
-
-  ExpressionPtr reference() {
-    ExpressionPtr out = node(Expression::Kind::Reference, identifier("expression").first);
-    if (take("(")) {
-      out->kind = Expression::Kind::Function;
-      out->arguments = arguments(")");
-      expect(")");
-      return out;
-    }
-    for (;;) {
-      Accessor accessor;
-      if (take("{")) {
-        do {
-          accessor.indices.push_back(expression());
-        } while (take(","));
-        expect("}");
-      } else if (take(".")) {
-        accessor.component = identifier("component").first;
-      } else {
-        return out;
-      }
-      out->path.push_back(std::move(accessor));
-    }
-  }
-
-  std::vector<Token> tokens_;
   const TypeTable& types_;
   Module* module_ = nullptr;
-  std::size_t at_ = 0;
-  int depth_ = 0;
 };
 
 }  // namespace
