@@ -454,6 +454,8 @@ void Alternatives::displaced_from(const Polygon& outline, bool anywhere, Region&
     for (const double by : {-48.0, -32.0, -20.0, -12.0, -6.0, 6.0, 12.0, 20.0, 32.0, 48.0})
       trials.push_back({by * axes[i], 0});
   }
+  // The slots that a member off its place has opened itself say where it is.
+  const bool off = (centroid(members_[m]) - centroid(outlines_[m])).norm() > kOnEdge_mm;
   bool drawn_known = false;
   for (const Trial& trial : trials) {
     const double most = point_nats_ * (trial.points + bared) + lost;
@@ -464,7 +466,7 @@ void Alternatives::displaced_from(const Polygon& outline, bool anywhere, Region&
     if (!drawn_known) region.drawn_nats = score({}, region), drawn_known = true;
     double gain = score(part, region) - region.drawn_nats;
     if (gain < kHopeless_nats || gain <= best.gain_nats) continue;
-    gain -= slots_nats(part, region);
+    if (!off) gain -= slots_nats(part, region);
     if (gain > best.gain_nats) best = {best.member, trial.shift, trial.points, gain};
   }
 }

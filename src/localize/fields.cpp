@@ -43,6 +43,18 @@ std::uint16_t score(double d) {
       std::lround(255 * std::max(0.0, (c2 / (c2 + d * d) - floor) / (1 - floor))));
 }
 
+Segment longest_side(const Polygon& outline) {
+  Segment best{Vec2::Zero(), Vec2::UnitX()};
+  double longest = 0;
+  for (std::size_t k = 0; k < outline.size(); ++k) {
+    const Segment side{outline[k], outline[(k + 1) % outline.size()]};
+    if (side.length() <= longest * (1 + 1e-9)) continue;
+    longest = side.length();
+    best = side;
+  }
+  return best;
+}
+
 }  // namespace
 
 int bin_of(double angle_rad) {
@@ -56,8 +68,11 @@ TemplateFields::TemplateFields(const workpiece::OutlineTemplate& outline) : radi
     edges_.push_back({edge.line.a - outline.centroid, edge.line.direction(), edge.outward, edge.line.length(),
                       edge.member, edge.round});
   }
-  for (const Polygon& member : outline.members)
+  for (const Polygon& member : outline.members) {
     member_centroids_.push_back(centroid(member) - outline.centroid);
+    const Segment side = longest_side(member);
+    member_frames_.push_back({member_centroids_.back(), side.direction(), side.length()});
+  }
   lay_grid(outline);
   scores_.resize(cells_ * kAllBins);
   starts_.assign(1, 0);

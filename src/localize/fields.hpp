@@ -26,6 +26,12 @@ inline constexpr int kAllBins = kBins + 1;
 /// The sector of a direction (radians, frame Part).
 int bin_of(double angle_rad);
 
+/// Where a member lies: its centroid about the template's, direction and length of its longest side.
+struct MemberFrame {
+  Vec2 centroid = Vec2::Zero(), axis = Vec2::UnitX();
+  double length_mm = 1;
+};
+
 /// All in frame Part with the template's centroid as origin, so that turning is about the centroid.
 class TemplateFields {
  public:
@@ -37,6 +43,7 @@ class TemplateFields {
   const Vec2& origin() const { return origin_; }
   const std::vector<FieldEdge>& edges() const { return edges_; }
   const std::vector<Vec2>& member_centroids() const { return member_centroids_; }
+  const std::vector<MemberFrame>& member_frames() const { return member_frames_; }
   double radius_mm() const { return radius_mm_; }
   /// Shifts of a pitch between members by which the outline nearly covers itself (slips.hpp).
   const std::vector<Vec2>& slips() const { return slips_; }
@@ -63,6 +70,7 @@ class TemplateFields {
   Vec2 origin_ = Vec2::Zero();
   std::vector<FieldEdge> edges_;
   std::vector<Vec2> member_centroids_, slips_;
+  std::vector<MemberFrame> member_frames_;
   std::vector<std::uint16_t> scores_;
   std::vector<std::uint32_t> starts_;
   std::vector<std::uint16_t> candidates_;

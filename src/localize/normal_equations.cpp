@@ -57,13 +57,6 @@ constexpr std::size_t kFirstScale = 2;
 /// A share too small to matter in any sum.
 constexpr double kNoShare = 1e-7;
 
-double log_sum(const std::vector<double>& logs) {
-  const double best = *std::max_element(logs.begin(), logs.end());
-  double sum = 0;
-  for (const double log : logs) sum += std::exp(log - best);
-  return best + std::log(sum);
-}
-
 /// Visits scales from the first one outwards, in either direction for as long as visit() says so.
 template <typename Visit>
 void outwards(std::size_t scales, const Visit& visit) {
@@ -75,8 +68,15 @@ void outwards(std::size_t scales, const Visit& visit) {
 
 }  // namespace
 
-NormalEquations::NormalEquations(const std::vector<Vec2>& member_centroids, const Priors& priors)
-    : centroids_(member_centroids), priors_(priors), sums_(member_centroids.size(), Sums::Zero()) {}
+double log_sum(const std::vector<double>& logs) {
+  const double best = *std::max_element(logs.begin(), logs.end());
+  double sum = 0;
+  for (const double log : logs) sum += std::exp(log - best);
+  return best + std::log(sum);
+}
+
+NormalEquations::NormalEquations(const std::vector<MemberFrame>& members, const Priors& priors)
+    : frames_(members), priors_(priors), sums_(members.size(), Sums::Zero()) {}
 
 void NormalEquations::clear() {
   for (Sums& sums : sums_) sums.setZero();
@@ -105,7 +105,7 @@ Common NormalEquations::solve_rigid() const {
 
 NormalEquations::Block NormalEquations::block(std::size_t member) const {
   const Sums full = sums_[member].selfadjointView<Eigen::Upper>();
-  const Vec2& m = centroids_[member];
+  const Vec2& m = frames_[member].centroid;
   // A turn about the member's centroid is a turn about the template's less the shift that this gives the
   // member.
   Eigen::Matrix3d to_member = Eigen::Matrix3d::Identity();
@@ -115,29 +115,49 @@ NormalEquations::Block NormalEquations::block(std::size_t member) const {
   return {cross.leftCols<3>() * to_member.transpose(), cross};
 }
 
-Eigen::Vector3d NormalEquations::prior_sigma(double k, bool free_member) const {
-  if (free_member) return {kFreeShift_mm, kFreeShift_mm, kFreeAngle_rad};
-  return {k * priors_.member_shift_mm, k * priors_.member_shift_mm, k * priors_.member_angle_rad};
+Eigen::Vector3d NormalEquations::prior_sigma(std::size_t member, double k, Freedom freedom) const {
+  if (freedom == Freedom::Wide) return {kFreeShift_mm, kFreeShift_mm, kFreeAngle_rad};
+  Eigen::Vector3d sigma(k * priors_.member_shift_mm, k * priors_.member_shift_mm,
+                        k * priors_.member_angle_rad);
+  if (freedom == Freedom::Along) sigma(0) = std::max(sigma(0), kOff_mm);
+  if (freedom == Freedom::Pulled) {
+    // The mean of both ends' shifts, and their difference over the length.
+    sigma(1) = std::max(sigma(1), kOff_mm / std::sqrt(2.0));
+    sigma(2) =
+        std::max(sigma(2), std::min(kOff_mm * std::sqrt(2.0) / frames_[member].length_mm, kFreeAngle_rad));
+  }
+  return sigma;
 }
 
-Eigen::Matrix3d NormalEquations::posterior(std::size_t member, double k, bool free_member, const Block& block,
+Eigen::Matrix3d NormalEquations::posterior(std::size_t member, double k, Freedom freedom, const Block& block,
                                            double& log_determinant) const {
-  const Eigen::Vector3d sigma = prior_sigma(k, free_member);
+  const Eigen::Vector3d sigma = prior_sigma(member, k, freedom);
   log_determinant = 0;
-  if (!touches(member)) return sigma.cwiseAbs2().asDiagonal();
-  if (k <= 0 && !free_member) return Eigen::Matrix3d::Zero();
-  // S^1/2 (I + S^1/2 G S^1/2)^-1 S^1/2: no division by a prior that may be tiny.
+  if (k <= 0 && freedom == Freedom::Held) return Eigen::Matrix3d::Zero();
+  // S^1/2 (I + S^1/2 G S^1/2)^-1 S^1/2: no division by a prior that may be tiny. G along the member's own
+  // axes where these differ.
   const Eigen::Matrix3d both = sigma * sigma.transpose();
-  const Eigen::Matrix3d inner = Eigen::Matrix3d::Identity() + block.gram.cwiseProduct(both);
+  if (sigma(0) == sigma(1)) {
+    if (!touches(member)) return sigma.cwiseAbs2().asDiagonal();
+    const Eigen::Matrix3d inner = Eigen::Matrix3d::Identity() + block.gram.cwiseProduct(both);
+    log_determinant = std::log(inner.determinant());
+    return inner.inverse().cwiseProduct(both);
+  }
+  const Vec2& d = frames_[member].axis;
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  axes.topLeftCorner<2, 2>() << d.x(), -d.y(), d.y(), d.x();
+  if (!touches(member)) return axes * sigma.cwiseAbs2().asDiagonal() * axes.transpose();
+  const Eigen::Matrix3d gram = axes.transpose() * block.gram * axes;
+  const Eigen::Matrix3d inner = Eigen::Matrix3d::Identity() + gram.cwiseProduct(both);
   log_determinant = std::log(inner.determinant());
-  return inner.inverse().cwiseProduct(both);
+  return axes * inner.inverse().cwiseProduct(both) * axes.transpose();
 }
 
-void NormalEquations::eliminate(std::size_t member, double k, bool free_member, const Block& block, int sign,
+void NormalEquations::eliminate(std::size_t member, double k, Freedom freedom, const Block& block, int sign,
                                 Reduced& left) const {
-  if (!touches(member) || (k <= 0 && !free_member)) return;
+  if (!touches(member) || (k <= 0 && freedom == Freedom::Held)) return;
   double log_determinant = 0;
-  const Eigen::Matrix3d own = posterior(member, k, free_member, block, log_determinant);
+  const Eigen::Matrix3d own = posterior(member, k, freedom, block, log_determinant);
   const Eigen::Matrix<double, 3, 6> carry = sign * own * block.cross;
   left.sums.noalias() -= block.cross.transpose() * carry;
   left.log_determinant += sign * log_determinant;
@@ -172,7 +192,7 @@ std::vector<NormalEquations::Block> NormalEquations::blocks() const {
   return out;
 }
 
-std::vector<Solution> NormalEquations::solve_common(double k, const std::vector<bool>& free_members,
+std::vector<Solution> NormalEquations::solve_common(double k, const Freedoms& freedoms,
                                                     const std::vector<double>& latencies_ms,
                                                     const std::vector<Block>& blocks, const Reduced& rigid,
                                                     std::vector<Own>& own) const {
@@ -180,7 +200,7 @@ std::vector<Solution> NormalEquations::solve_common(double k, const std::vector<
   own.resize(sums_.size());
   for (std::size_t m = 0; m < sums_.size(); ++m) {
     double log_determinant = 0;
-    own[m].posterior = posterior(m, k, free_members[m], blocks[m], log_determinant);
+    own[m].posterior = posterior(m, k, freedoms[m], blocks[m], log_determinant);
     if (!touches(m) || log_determinant == 0) continue;
     own[m].carry.noalias() = own[m].posterior * blocks[m].cross;
     left.sums.noalias() -= blocks[m].cross.transpose() * own[m].carry;
@@ -212,10 +232,9 @@ void NormalEquations::solve_members(const std::vector<Own>& own, Detail detail, 
   }
 }
 
-Solution NormalEquations::solve(double k, const std::vector<bool>& free_members, Detail detail) const {
+Solution NormalEquations::solve(double k, const Freedoms& freedoms, Detail detail) const {
   std::vector<Own> own;
-  Solution out =
-      std::move(solve_common(k, free_members, {priors_.latency_ms}, blocks(), rigid(), own).front());
+  Solution out = std::move(solve_common(k, freedoms, {priors_.latency_ms}, blocks(), rigid(), own).front());
   solve_members(own, detail, out);
   return out;
 }
@@ -239,7 +258,7 @@ std::vector<NormalEquations::Scale> NormalEquations::scales() const {
   return out;
 }
 
-std::vector<Weighed> NormalEquations::over_scales(const std::vector<bool>& free_members,
+std::vector<Weighed> NormalEquations::over_scales(const Freedoms& freedoms,
                                                   const std::vector<double>& latencies_ms,
                                                   Detail detail) const {
   const std::vector<Block> all = blocks();
@@ -249,7 +268,7 @@ std::vector<Weighed> NormalEquations::over_scales(const std::vector<bool>& free_
   std::vector<std::vector<Solution>> answers(each.size());
   double best_weight = -1e300, best_bet = -1e300;
   outwards(each.size(), [&](std::size_t i) {
-    answers[i] = solve_common(each[i].k, free_members, latencies_ms, all, undivided, own[i]);
+    answers[i] = solve_common(each[i].k, freedoms, latencies_ms, all, undivided, own[i]);
     bool matters = false;
     for (const Solution& solution : answers[i]) {
       const double weight = solution.log_evidence + each[i].log_weight,
@@ -274,7 +293,7 @@ std::vector<Weighed> NormalEquations::over_scales(const std::vector<bool>& free_
   return out;
 }
 
-double NormalEquations::evidence(const std::vector<bool>& free_members) const {
+double NormalEquations::evidence(const Freedoms& freedoms) const {
   std::vector<double> logs;
   const std::vector<Block> all = blocks();
   const std::vector<Scale> each = scales();
@@ -283,7 +302,7 @@ double NormalEquations::evidence(const std::vector<bool>& free_members) const {
   double best = -1e300;
   outwards(each.size(), [&](std::size_t i) {
     Reduced left = undivided;
-    for (std::size_t m = 0; m < sums_.size(); ++m) eliminate(m, each[i].k, free_members[m], all[m], 1, left);
+    for (std::size_t m = 0; m < sums_.size(); ++m) eliminate(m, each[i].k, freedoms[m], all[m], 1, left);
     logs.push_back(evidence_of(left) + each[i].log_weight);
     best = std::max(best, logs.back());
     return logs.back() > best - kHopeless_nats;
@@ -291,26 +310,24 @@ double NormalEquations::evidence(const std::vector<bool>& free_members) const {
   return log_sum(logs);
 }
 
-std::vector<double> NormalEquations::evidence_turned(const std::vector<bool>& free_members,
-                                                     const std::vector<std::size_t>& members,
-                                                     const std::vector<double>& latencies_ms) const {
+std::vector<double> NormalEquations::evidence_with(const Freedoms& freedoms, const std::vector<Freed>& tried,
+                                                   const std::vector<double>& latencies_ms) const {
   const std::vector<Block> all = blocks();
   const std::vector<Scale> each = scales();
   const Reduced undivided = rigid();
-  std::vector<std::vector<double>> logs(members.size());
-  std::vector<double> best(members.size(), -1e300);
+  std::vector<std::vector<double>> logs(tried.size());
+  std::vector<double> best(tried.size(), -1e300);
   outwards(each.size(), [&](std::size_t scale) {
     Reduced held = undivided;
-    for (std::size_t m = 0; m < sums_.size(); ++m)
-      eliminate(m, each[scale].k, free_members[m], all[m], 1, held);
+    for (std::size_t m = 0; m < sums_.size(); ++m) eliminate(m, each[scale].k, freedoms[m], all[m], 1, held);
     bool matters = false;
-    for (std::size_t i = 0; i < members.size(); ++i) {
-      const std::size_t m = members[i];
-      Reduced turned = held;
-      eliminate(m, each[scale].k, free_members[m], all[m], -1, turned);
-      eliminate(m, each[scale].k, !free_members[m], all[m], 1, turned);
+    for (std::size_t i = 0; i < tried.size(); ++i) {
+      const std::size_t m = tried[i].member;
+      Reduced other = held;
+      eliminate(m, each[scale].k, freedoms[m], all[m], -1, other);
+      eliminate(m, each[scale].k, tried[i].freedom, all[m], 1, other);
       for (const double latency_ms : latencies_ms) {
-        Reduced total = turned;
+        Reduced total = other;
         add_prior(latency_ms, total);
         logs[i].push_back(evidence_of(total) + each[scale].log_weight);
         best[i] = std::max(best[i], logs[i].back());
@@ -359,17 +376,6 @@ Solution about(const std::vector<Weighed>& each, const Solution& estimate) {
           share * (w.solution.members[m].covariance + member_off * member_off.transpose());
     }
   }
-  return out;
-}
-
-MemberSolution NormalEquations::unshrunk(std::size_t member, const Common& common) const {
-  const Block b = block(member);
-  const Eigen::Vector3d sigma = prior_sigma(0, true);
-  const Eigen::Matrix3d inner =
-      Eigen::Matrix3d::Identity() + sigma.asDiagonal() * b.gram * sigma.asDiagonal();
-  MemberSolution out;
-  out.covariance = sigma.asDiagonal() * inner.inverse() * sigma.asDiagonal();
-  out.shift = out.covariance * (b.cross.col(5) - b.cross.leftCols<5>() * common);
   return out;
 }
 

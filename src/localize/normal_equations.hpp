@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -44,13 +45,25 @@ Solution mean_of(const std::vector<Weighed>& each);
 /// The same about a given estimate (its `common` and the members' shifts).
 Solution about(const std::vector<Weighed>& each, const Solution& estimate);
 
+/// Logarithm of the sum of what these are the logarithms of.
+double log_sum(const std::vector<double>& logs);
+
 /// Whether a solution holds the members' covariances as well, or their shifts only.
 enum class Detail : std::uint8_t { Shifts, All };
 
+/// In what a member may be off by more than the drawing's tolerance: in nothing, along its longest side,
+/// across it at either end, or in everything.
+enum class Freedom : std::uint8_t { Held, Along, Pulled, Wide };
+inline constexpr std::array<Freedom, 3> kFreedoms{Freedom::Along, Freedom::Pulled, Freedom::Wide};
+using Freedoms = std::vector<Freedom>;  ///< of each member
+struct Freed {
+  std::size_t member = 0;
+  Freedom freedom = Freedom::Held;
+};
+
 class NormalEquations {
  public:
-  /// member_centroids about the template's centroid.
-  NormalEquations(const std::vector<Vec2>& member_centroids, const Priors& priors);
+  NormalEquations(const std::vector<MemberFrame>& members, const Priors& priors);
 
   void clear();
   void add(int member, const Row& row, double weight);
@@ -58,22 +71,17 @@ class NormalEquations {
   bool touches(std::size_t member) const { return sums_[member](0, 0) + sums_[member](1, 1) > 0; }
   /// Common parameters alone, members rigid.
   Common solve_rigid() const;
-  /// With member shifts of prior k * tolerance; members flagged free have a wide prior instead. k = 0: rigid.
-  Solution solve(double k, const std::vector<bool>& free_members, Detail detail = Detail::All) const;
+  /// With member shifts of prior k * tolerance, wider where a member is free. k = 0: rigid.
+  Solution solve(double k, const Freedoms& freedoms, Detail detail = Detail::All) const;
   /// One answer for each scale k and each prior of the latency, weighed by its evidence and the prior of the
   /// scales; none for scales too unlikely to change any digit.
-  std::vector<Weighed> over_scales(const std::vector<bool>& free_members,
-                                   const std::vector<double>& latencies_ms,
+  std::vector<Weighed> over_scales(const Freedoms& freedoms, const std::vector<double>& latencies_ms,
                                    Detail detail = Detail::All) const;
   /// Log-evidence over all scales.
-  double evidence(const std::vector<bool>& free_members) const;
-  /// The same over the priors of the latency with the flag of one member turned, for each of the members
-  /// given.
-  std::vector<double> evidence_turned(const std::vector<bool>& free_members,
-                                      const std::vector<std::size_t>& members,
-                                      const std::vector<double>& latencies_ms) const;
-  /// A member's own shift when nothing is assumed about it, given the common solution.
-  MemberSolution unshrunk(std::size_t member, const Common& common) const;
+  double evidence(const Freedoms& freedoms) const;
+  /// The same over the priors of the latency with another freedom of one member, for each of those given.
+  std::vector<double> evidence_with(const Freedoms& freedoms, const std::vector<Freed>& tried,
+                                    const std::vector<double>& latencies_ms) const;
 
  private:
   using Sums = Eigen::Matrix<double, 6, 6>;  ///< of (a, l, b, residual)
@@ -98,26 +106,27 @@ class NormalEquations {
     Eigen::Matrix<double, 3, 6> carry = Eigen::Matrix<double, 3, 6>::Zero();
   };
   Block block(std::size_t member) const;
-  Eigen::Vector3d prior_sigma(double k, bool free_member) const;
+  /// Of a member along itself, across and turned.
+  Eigen::Vector3d prior_sigma(std::size_t member, double k, Freedom freedom) const;
   /// Covariance of a member's shift given the common parameters.
-  Eigen::Matrix3d posterior(std::size_t member, double k, bool free_member, const Block& block,
+  Eigen::Matrix3d posterior(std::size_t member, double k, Freedom freedom, const Block& block,
                             double& log_determinant) const;
   /// Takes a member's own shift out of what is left (sign 1), or puts it back (-1).
-  void eliminate(std::size_t member, double k, bool free_member, const Block& block, int sign,
+  void eliminate(std::size_t member, double k, Freedom freedom, const Block& block, int sign,
                  Reduced& left) const;
   Reduced rigid() const;
   void add_prior(double latency_ms, Reduced& left) const;
   std::vector<Block> blocks() const;
   double evidence_of(const Reduced& total) const;
   /// The common parameters of one scale for each prior of the latency, and what the members know beside them.
-  std::vector<Solution> solve_common(double k, const std::vector<bool>& free_members,
+  std::vector<Solution> solve_common(double k, const Freedoms& freedoms,
                                      const std::vector<double>& latencies_ms,
                                      const std::vector<Block>& blocks, const Reduced& rigid,
                                      std::vector<Own>& own) const;
   void solve_members(const std::vector<Own>& own, Detail detail, Solution& solution) const;
   std::vector<Scale> scales() const;
 
-  std::vector<Vec2> centroids_;
+  std::vector<MemberFrame> frames_;
   Priors priors_;
   std::vector<Sums> sums_;
 };
@@ -125,5 +134,7 @@ class NormalEquations {
 /// Prior of a member about which nothing is assumed.
 inline constexpr double kFreeShift_mm = 6;
 inline constexpr double kFreeAngle_rad = 0.05;
+/// Of one that is off in one way only: along itself, or at each of its ends across itself.
+inline constexpr double kOff_mm = 3;
 
 }  // namespace weldcell::localize

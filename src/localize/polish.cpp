@@ -49,7 +49,7 @@ FitState polish(const TemplateFields& fields, const std::vector<Crossing>& cross
   priors.inset_mm = 0;
   FitState state;
   state.pose = start;
-  NormalEquations equations({Vec2::Zero()}, priors);  // members rigid: the part is one
+  NormalEquations equations({MemberFrame{}}, priors);  // members rigid: the part is one
   double scale = first_scale_mm;
   for (int step = 0; step < 12; ++step) {
     const double c = std::cos(state.pose.theta_rad), s = std::sin(state.pose.theta_rad);

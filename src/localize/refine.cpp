@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <numeric>
 
 #include "fit.hpp"
+#include "freedom.hpp"
 #include "normal_equations.hpp"
 #include "rows.hpp"
 
@@ -15,7 +15,6 @@ namespace {
 constexpr double kWideInset_mm = 3;
 /// Odds that a stated prior holds, before the points speak.
 constexpr double kPriorHolds_nats = 3;
-constexpr double kFreeMember_nats = 2;
 /// Odds of the wide prior of the latency over the stated one, before the points speak.
 constexpr double kWideLatency_nats = 2;
 /// Odds of about 1000 : 1 tell which of two members is off.
@@ -33,7 +32,7 @@ class Refinement {
         crossings_(crossings),
         priors_(priors),
         start_(nearness),
-        free_(fields.member_centroids().size(), false),
+        free_(fields.member_centroids().size(), Freedom::Held),
         rows_(crossings.size()) {
     fit_.state = start;
     fit_.state.members.assign(free_.size(), MemberShift::Zero());
@@ -113,7 +112,7 @@ class Refinement {
       wide.member_shift_mm = 2;
       wide.member_angle_rad = 0.01;
     }
-    NormalEquations equations(fields_.member_centroids(), wide);
+    NormalEquations equations(fields_.member_frames(), wide);
     for (const double scale : {5.0, 3.0, 2.0}) {
       if (start_ == Start::Close && scale > 2) continue;
       place();
@@ -129,7 +128,7 @@ class Refinement {
       const MemberShift& u = fit_.state.members[m];
       Eigen::Matrix3d spread = fit_.member_covariance[m];
       spread.diagonal() += tolerance;
-      free_[m] = u.dot(spread.ldlt().solve(u)) > kFarOff * kFarOff;
+      free_[m] = u.dot(spread.ldlt().solve(u)) > kFarOff * kFarOff ? Freedom::Wide : Freedom::Held;
     }
     measure_scale();
   }
@@ -164,7 +163,7 @@ class Refinement {
   }
 
   double evidence_of(const Priors& priors) {
-    NormalEquations equations(fields_.member_centroids(), priors);
+    NormalEquations equations(fields_.member_frames(), priors);
     const double c = std::cos(fit_.state.pose.theta_rad), s = std::sin(fit_.state.pose.theta_rad);
     for (std::size_t i = 0; i < crossings_.size(); ++i) {
       if (fit_.matches[i].edge < 0) continue;
@@ -178,46 +177,37 @@ class Refinement {
     return equations.evidence(free_);
   }
 
+  static bool is_free(Freedom f) { return f != Freedom::Held; }
+
   /// One member far off among members that are as drawn must not widen the tolerance of all: it is set free
   /// when the evidence pays for its freedom.
   void free_outlying_members() {
-    NormalEquations equations(fields_.member_centroids(), priors_);
+    NormalEquations equations(fields_.member_frames(), priors_);
     if (priors_.member_shift_mm <= 0) return;
     place();
     weigh_mixture(equations);
     double held = equations.evidence(free_);
     for (std::size_t freed = 0; freed < std::max<std::size_t>(1, free_.size() / 4); ++freed) {
-      const std::vector<std::size_t> tried = most_displaced(equations);
+      const std::vector<std::size_t> tried = most_strained(equations, priors_, free_);
       if (tried.empty()) return;
-      const std::vector<double> evidence = equations.evidence_turned(free_, tried, {priors_.latency_ms});
-      const auto best = std::max_element(evidence.begin(), evidence.end());
-      if (*best - held <= kFreeMember_nats) return;
-      free_[tried[static_cast<std::size_t>(best - evidence.begin())]] = true;
-      held = *best;
+      const std::vector<Hypothesis> all = hypotheses(equations, free_, tried, {priors_.latency_ms});
+      const std::vector<double> sums = sum_by_member(all, free_.size());
+      const std::size_t member = likeliest(sums);
+      if (sums[member] <= held) return;
+      held = -1e300;
+      for (const Hypothesis& h : all) {
+        if (h.freed.member != member || h.nats <= held) continue;
+        free_[member] = h.freed.freedom;
+        held = h.nats;
+      }
     }
-  }
-
-  /// The three members that strain most at a tight tolerance.
-  std::vector<std::size_t> most_displaced(const NormalEquations& equations) const {
-    const Solution tight = equations.solve(0.5, free_, Detail::Shifts);
-    std::vector<std::pair<double, std::size_t>> strain;
-    for (std::size_t m = 0; m < free_.size(); ++m) {
-      const MemberShift& u = tight.members[m].shift;
-      const double turned = u.z() / std::max(priors_.member_angle_rad, 1e-4);
-      if (!free_[m]) strain.push_back({-u.head<2>().norm() / priors_.member_shift_mm - std::abs(turned), m});
-    }
-    std::sort(strain.begin(), strain.end());
-    std::vector<std::size_t> out;
-    for (std::size_t i = 0; i < std::min<std::size_t>(3, strain.size()); ++i) {
-      if (strain[i].first < -0.5) out.push_back(strain[i].second);
-    }
-    return out;
   }
 
   void iterate(int step) {
     place();
-    NormalEquations equations(fields_.member_centroids(), priors_);
+    NormalEquations equations(fields_.member_frames(), priors_);
     weigh_mixture(equations);
+    if (step == kSteps - 1 && !few(free_)) strained_ = !most_strained(equations, priors_, free_).empty();
     const Detail detail = step + 1 < kSteps ? Detail::Shifts : Detail::All;
     take(mean_of(answers(equations, free_, detail)), detail);
     if (step == 1 || step == 2) rescale();
@@ -232,10 +222,10 @@ class Refinement {
 
   /// Over scales and latencies. Where a scan tells a latency from a turn by little the stated prior, which
   /// bends the pose when it is wrong, must be the likelier one by more than the charge alone.
-  std::vector<Weighed> answers(const NormalEquations& equations, const std::vector<bool>& free_members,
+  std::vector<Weighed> answers(const NormalEquations& equations, const Freedoms& freedoms,
                                Detail detail = Detail::All) const {
     const std::vector<double> latencies = latencies_ms();
-    std::vector<Weighed> out = equations.over_scales(free_members, latencies, detail);
+    std::vector<Weighed> out = equations.over_scales(freedoms, latencies, detail);
     for (std::size_t i = 1; latencies.size() == 2 && i < out.size(); i += 2) {
       out[i].log_weight += kWideLatency_nats;
       out[i].log_bet += kWideLatency_nats;
@@ -243,37 +233,61 @@ class Refinement {
     return out;
   }
 
-  /// A rail pulled off its rungs looks the same as the rest of the part pulled off that rail. Where another
-  /// member set free instead explains the points about as well, the covariance holds the spread between both.
+  /// A member may be off in one way or another, or hardly at all; a rail pulled off its rungs, moreover,
+  /// looks the same as the rest of the part pulled off that rail. What explains the points about as well
+  /// takes part in the covariance.
   void weigh_other_members() {
-    if (std::count(free_.begin(), free_.end(), true) != 1) return;
-    const auto held = static_cast<std::size_t>(std::find(free_.begin(), free_.end(), true) - free_.begin());
+    const auto freed = std::count_if(free_.begin(), free_.end(), is_free);
+    if (freed > 1 || priors_.member_shift_mm <= 0 || (freed == 0 && !strained_)) return;
     place();
-    NormalEquations equations(fields_.member_centroids(), priors_);
+    NormalEquations equations(fields_.member_frames(), priors_);
     weigh_mixture(equations);
-    std::vector<std::size_t> each(free_.size());
-    std::iota(each.begin(), each.end(), std::size_t{0});
-    const std::vector<double> evidence =
-        equations.evidence_turned(std::vector<bool>(free_.size(), false), each, latencies_ms());
-    std::size_t other = held;
-    double best = evidence[held] - kTellsMembers_nats;
-    for (std::size_t m = 0; m < free_.size(); ++m) {
-      if (m == held || !equations.touches(m) || evidence[m] <= best) continue;
-      other = m;
-      best = evidence[m];
-    }
-    if (other == held) return;
-    std::vector<bool> swapped(free_.size(), false);
-    swapped[other] = true;
-    std::vector<Weighed> both = answers(equations, free_), second = answers(equations, swapped);
-    const Solution stated = mean_of(both);
-    Either either{{static_cast<int>(held), after(stated)},
-                  {static_cast<int>(other), after(mean_of(second))},
-                  stated.members[held].shift.head<2>().norm()};
+    const std::vector<std::size_t> members =
+        freed == 0 ? most_strained(equations, priors_, free_)
+                   : with_the_likeliest_instead(equations, free_, latencies_ms());
+    if (members.empty()) return;
+    const Freedoms drawn(free_.size(), Freedom::Held);
+    const std::vector<Hypothesis> all = hypotheses(equations, drawn, members, latencies_ms());
+    const std::vector<double> sums = sum_by_member(all, free_.size());
+    const std::size_t first = likeliest(sums);
+    const double as_drawn =
+        few(free_) ? -1e300 : equations.evidence_with(drawn, {Freed{}}, latencies_ms()).front();
+    const double least = std::max(sums[first], as_drawn) - kTellsMembers_nats;
+    if (sums[first] < least) return;
+    std::vector<Weighed> common;
+    if (as_drawn > least) common = answers(equations, drawn);
+    const auto reading = [&](std::size_t member) {
+      std::vector<Weighed> out = common;
+      for (const Hypothesis& h : all) {
+        if (h.freed.member != member || h.nats < sums[member] - kTellsMembers_nats) continue;
+        Freedoms freedoms = drawn;
+        freedoms[member] = h.freed.freedom;
+        for (Weighed& w : answers(equations, freedoms)) {
+          w.log_weight -= odds_nats(h.freed.freedom);
+          w.log_bet -= odds_nats(h.freed.freedom);
+          out.push_back(std::move(w));
+        }
+      }
+      return out;
+    };
+    const std::vector<Weighed> stated = reading(first);
+    Solution estimate = mean_of(stated);
     // The likelier reading instead of the mean, which would be right in neither case; the covariance is the
     // mean square about it over both.
-    both.insert(both.end(), std::make_move_iterator(second.begin()), std::make_move_iterator(second.end()));
-    take(about(both, stated));
+    std::vector<double> others = sums;
+    others[first] = -1e300;
+    const std::size_t second = likeliest(others);
+    if (others[second] < least || as_drawn > sums[first]) {
+      take(estimate);
+      return;
+    }
+    std::vector<Weighed> swapped = reading(second), both = stated;
+    Either either{{static_cast<int>(first), after(estimate)},
+                  {static_cast<int>(second), after(mean_of(swapped))},
+                  estimate.members[first].shift.head<2>().norm()};
+    swapped.erase(swapped.begin(), swapped.begin() + static_cast<std::ptrdiff_t>(common.size()));
+    both.insert(both.end(), std::make_move_iterator(swapped.begin()), std::make_move_iterator(swapped.end()));
+    take(about(both, estimate));
     fit_.either = std::move(either);
   }
 
@@ -345,7 +359,8 @@ class Refinement {
   const std::vector<Crossing>& crossings_;
   Priors priors_;
   Start start_;
-  std::vector<bool> free_;
+  Freedoms free_;
+  bool strained_ = false;  ///< some member presses against a tight tolerance
   std::vector<Row> rows_;
   Fit fit_;
 };
