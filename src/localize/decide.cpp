@@ -30,6 +30,8 @@ constexpr double kPoseBound_rad = rad(0.2);
 constexpr double kMostFartherOff = 0.09;
 /// A pose with a longer tail than this (1 sigma) is not placed, however unlikely the tail.
 constexpr double kMostSigma_mm = 0.75;
+/// Where either of two members may be off: the unlikelier reading lies millimetres away.
+constexpr double kMostSigmaOfEither_mm = 0.4;
 
 /// What could be other than drawn without this scan having shown it.
 bool not_looked_at(const Situation& s, const Alternatives& alternatives, Localization& result) {
@@ -73,7 +75,7 @@ bool too_vague(const Situation& s, Localization& result) {
   const double largest = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(xy).eigenvalues()(1);
   const double sigma_rad = std::sqrt(result.covariance(2, 2));
   // Of two readings that lie apart the unlikelier one is not passed over.
-  const double most_sigma = s.fit.either ? 0.5 * kPoseBound_mm : kMostSigma_mm;
+  const double most_sigma = s.fit.either ? kMostSigmaOfEither_mm : kMostSigma_mm;
   // A covariance that rounding has left without a positive determinant proves nothing either.
   const bool proven = result.covariance.allFinite() && largest <= most_sigma * most_sigma &&
                       Eigen::LLT<Eigen::Matrix3d>(result.covariance).info() == Eigen::Success;

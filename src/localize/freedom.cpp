@@ -11,12 +11,13 @@ namespace {
 
 /// Of a member that is off in everything; so wide a prior pays for itself besides.
 constexpr double kWide_nats = 2;
-/// Of one that is off in one way only, so that many a member within its tolerance would look so.
-constexpr double kOff_nats = 6;
+/// Of one that is off in one way only, so that many a member within its tolerance would look so; along itself
+/// that hardly moves the pose.
+constexpr double kPulled_nats = 6;
+constexpr double kAlong_nats = 4;
 constexpr std::size_t kFewestTelling = 4;
 constexpr std::size_t kTried = 3;
 constexpr double kTight = 0.1;       ///< of the drawing's tolerance
-constexpr double kLeastStrain = 3;   ///< sigmas
 constexpr double kLeastTold = 1e-3;  ///< of a prior's variance, below which points tell nothing
 constexpr double kImpossible_nats = -1e300;
 
@@ -31,7 +32,10 @@ std::vector<std::size_t> first_of(Ordered& order) {
 
 }  // namespace
 
-double odds_nats(Freedom freedom) { return freedom == Freedom::Wide ? kWide_nats : kOff_nats; }
+double odds_nats(Freedom freedom) {
+  if (freedom == Freedom::Along) return kAlong_nats;
+  return freedom == Freedom::Pulled ? kPulled_nats : kWide_nats;
+}
 
 bool few(const Freedoms& freedoms) { return freedoms.size() < kFewestTelling; }
 
@@ -68,6 +72,8 @@ std::vector<std::size_t> most_strained(const NormalEquations& equations, const P
   const Solution tight = equations.solve(kTight, freedoms);
   const Eigen::Vector3d prior =
       kTight * Eigen::Vector3d(priors.member_shift_mm, priors.member_shift_mm, priors.member_angle_rad);
+  // About what the largest of so many strains is by noise alone, sigmas.
+  const double least = std::sqrt(2 * std::log(std::max<double>(2, static_cast<double>(freedoms.size()))));
   Ordered order;
   for (std::size_t m = 0; m < freedoms.size(); ++m) {
     if (freedoms[m] != Freedom::Held) continue;
@@ -78,7 +84,7 @@ std::vector<std::size_t> most_strained(const NormalEquations& equations, const P
       const double told = std::max(variance - left, kLeastTold * variance);
       if (told > 0) strain = std::max(strain, std::abs(tight.members[m].shift(i)) / std::sqrt(told));
     }
-    if (strain > kLeastStrain) order.push_back({-strain, m});
+    if (strain > least) order.push_back({-strain, m});
   }
   return first_of(order);
 }

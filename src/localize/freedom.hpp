@@ -30,7 +30,7 @@ std::vector<double> sum_by_member(const std::vector<Hypothesis>& all, std::size_
 std::size_t likeliest(const std::vector<double>& nats);
 
 /// Of the members that are held, at most three that strain most against a tenth of the drawing's tolerance,
-/// those first; none that does by less than three sigmas.
+/// those first; none that noise alone would strain so.
 std::vector<std::size_t> most_strained(const NormalEquations& equations, const Priors& priors,
                                        const Freedoms& freedoms);
 

@@ -61,6 +61,18 @@ class Refinement {
     fit_.covariance = coarse.fit_.covariance;
     fit_.member_covariance = coarse.fit_.member_covariance;
   }
+  /// Whether a member is free altogether that could be so in one way only.
+  bool any_wide() const { return !few(free_) && std::count(free_.begin(), free_.end(), Freedom::Wide) > 0; }
+  /// Members free altogether are held along themselves from here on.
+  void hold_along() {
+    for (std::size_t m = 0; m < free_.size(); ++m) {
+      if (free_[m] != Freedom::Wide) continue;
+      free_[m] = Freedom::Pulled;
+      MemberShift& u = fit_.state.members[m];
+      const Vec2& d = fields_.member_frames()[m].axis;
+      u.head<2>() -= u.head<2>().dot(d) * d;
+    }
+  }
   Fit run() {
     for (int step = 0; step < kSteps; ++step) iterate(step);
     weigh_other_members();
@@ -378,7 +390,13 @@ Fit refine(const TemplateFields& fields, const std::vector<Crossing>& crossings,
     coarse.settle();
     all.adopt(coarse);
   }
-  return all.run();
+  if (!all.any_wide()) return all.run();
+  // One or two points on its ends, or a stray one in place of them, must not carry a free member along
+  // itself.
+  Refinement held = all;
+  held.hold_along();
+  Fit free = all.run(), other = held.run();
+  return other.log_likelihood > free.log_likelihood ? other : free;
 }
 
 void settle_on(const TemplateFields& fields, const std::vector<Crossing>& crossings, const Estimate& estimate,
