@@ -322,6 +322,14 @@ bool Alternatives::refutes(std::size_t member, const Polygon& instead, const Box
   return refuted_by(closed - hidden) || refuted_by(unseen(other, kNarrow_mm));
 }
 
+double Alternatives::most_gain(const Box2& within) const {
+  const Box2 box = grown(within, kSeenAt_mm);
+  int free = 0;
+  for (auto s = first_from(box.min.x()); s != spots_.end() && s->place.x() <= box.max.x(); ++s)
+    free += s->free && in_box(s->place, box);
+  return point_nats_ * free + unseen_nats_ * std::accumulate(unseen_.begin(), unseen_.end(), 0);
+}
+
 double Alternatives::places_nats() const {
   double out = 1;
   for (const Polygon& outline : outlines_)

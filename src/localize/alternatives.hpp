@@ -41,6 +41,9 @@ class Alternatives {
   /// Whether the scan prefers the drawing as it is, by this many nats or more, to a part that has this
   /// outline instead of the member's and differs within the box only.
   bool refutes(std::size_t member, const Polygon& instead, const Box2& within, double nats) const;
+  /// What any other outline may gain at most that differs within the box only: all that is unexplained there
+  /// explained, and nothing left unseen.
+  double most_gain(const Box2& within) const;
   /// The members' outlines where the fit has them, frame Part.
   const std::vector<Polygon>& members() const { return members_; }
 

@@ -45,11 +45,11 @@ bool not_looked_at(const Situation& s, const Alternatives& alternatives, Localiz
   const std::string more =
       open.size() > 1 ? fmt::format(", and {} more line{}", open.size() - 1, open.size() > 2 ? "s" : "") : "";
   say(result, Verdict::Rescan, "not_looked_at",
-      fmt::format(
-          "The {} was not looked at: it could be off by {} without the scan showing it. Scan across it "
-          "from ({:.0f}, {:.0f}) to ({:.0f}, {:.0f}) on the drawing{}.",
-          place_name(s.outline, first.departure), millimetres(s.options.prove_shift_mm), first.pass.a.x(),
-          first.pass.a.y(), first.pass.b.x(), first.pass.b.y(), more));
+      fmt::format("The {} was not looked at: it could be {} without the scan showing it. Scan across it "
+                  "from ({:.0f}, {:.0f}) to ({:.0f}, {:.0f}) on the drawing{}.",
+                  place_name(s.outline, first.departure),
+                  first.departure.over ? "another" : "off by " + millimetres(s.options.prove_shift_mm),
+                  first.pass.a.x(), first.pass.a.y(), first.pass.b.x(), first.pass.b.y(), more));
   return true;
 }
 

@@ -49,15 +49,25 @@ class PointsOnSides {
   std::vector<std::vector<std::vector<Vec2>>> sides_;
 };
 
+bool on_a_side(const Vec2& place, const Polygon& outline) {
+  for (std::size_t k = 0; k < outline.size(); ++k) {
+    if (distance(place, Segment{outline[k], outline[(k + 1) % outline.size()]}) < kCorner_mm) return true;
+  }
+  return false;
+}
+
 /// Whether points on the member's own sides alone speak against the departure: on the side that moves, on
-/// ends of a shifted member, or on long sides in the half that swings.
+/// ends of a shifted member, on long sides in the half that swings, or where one turned over has no side.
 bool held_by_points(const Departure& departure, const Polygon& outline, const PointsOnSides& points) {
   const Vec2 middle = centroid(outline);
   std::size_t count = 0;
   for (std::size_t k = 0; k < points.sides(departure.member); ++k) {
     const std::vector<Vec2>& on = points.on(departure.member, k);
     if (on.empty()) continue;
-    if (departure.whole) {
+    if (departure.over) {
+      count += static_cast<std::size_t>(std::count_if(
+          on.begin(), on.end(), [&](const Vec2& p) { return !on_a_side(p, departure.instead); }));
+    } else if (departure.whole) {
       if (workpiece::is_end(outline, k)) count += on.size();
     } else if (departure.side >= 0) {
       if (departure.side == static_cast<int>(k)) count += on.size();
@@ -110,6 +120,7 @@ std::vector<Unproven> unproven(const Situation& s, const Alternatives& alternati
 
 std::string place_name(const workpiece::OutlineTemplate& outline, const Departure& departure) {
   const std::string& member = outline.member_names[static_cast<std::size_t>(departure.member)];
+  if (departure.over) return fmt::format("way round of {}", member);
   if (departure.side < 0) return fmt::format("direction of {}", member);
   return fmt::format("{} {} of {}", side_word(departure.outward), departure.end ? "end" : "side", member);
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "weldcell/base/units.hpp"
 #include "weldcell/workpiece/departures.hpp"
@@ -24,6 +25,8 @@ constexpr double kDisplaced_nats = 9;
 /// a hundred is wrong, before it is told 10 : 1. No stray point alone gains so much.
 constexpr double kFound_nats = 7;
 constexpr double kDoubtful_nats = 7;
+/// Of three ways round of a dozen members; no stray point alone gains so much.
+constexpr double kOver_nats = 10;
 /// Passes over an end lie so far off its middle; ends are 30 mm wide and more.
 constexpr double kAside_mm = 5;
 
@@ -184,6 +187,18 @@ void ask_about(const Situation& s, const Alternatives& alternatives, const Displ
   }
 }
 
+/// A member that points and travel find turned over in its place, by more than so many nats.
+std::optional<int> turned_over(const Situation& s, const Alternatives& alternatives, double nats) {
+  for (int m = 0; m < static_cast<int>(s.evidence.members.size()); ++m) {
+    const auto member = static_cast<std::size_t>(m);
+    for (const workpiece::Departure& d : workpiece::turned_over(alternatives.members(), member)) {
+      if (alternatives.most_gain(d.reach) > nats && !alternatives.refutes(member, d.instead, d.reach, -nats))
+        return m;
+    }
+  }
+  return std::nullopt;
+}
+
 /// A member that points and travel find at another place, or not at all.
 bool member_elsewhere(const Situation& s, const Alternatives& alternatives, Localization& result) {
   const std::vector<int> unseen = unseen_members(s.evidence);
@@ -195,6 +210,14 @@ bool member_elsewhere(const Situation& s, const Alternatives& alternatives, Loca
   }
   double without = kNothing_nats;
   if (!unseen.empty()) without = alternatives.missing(unseen.front());
+  if (const auto over = turned_over(s, alternatives, std::max({kOver_nats, best.gain_nats, without}))) {
+    say(result, Verdict::Reject, "wrong_revision",
+        fmt::format(
+            "{} lies turned over or end for end in its place. Turn it round, or check the part against "
+            "drawing {}.",
+            member_name(s, *over), s.outline.name));
+    return true;
+  }
   if (best.gain_nats >= kDoubtful_nats && best.gain_nats > without) {
     const std::string& name = member_name(s, best.member);
     // What little evidence may still be chance: looking again settles it.

@@ -1,59 +1,20 @@
 #include "weldcell/workpiece/departures.hpp"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <iterator>
+
+#include "outline_sides.hpp"
 
 namespace weldcell::workpiece {
 
 namespace {
 
 constexpr double kShortestSide_mm = 8;
-constexpr double kMinAcross = 0.35;
-constexpr double kEndMargin_mm = 3;
-/// Crossings of like direction closer than this are one to a beam that measures steps of many millimetres.
-constexpr double kSame_mm = 5;
-/// Room that a pass keeps before and behind the edges that tell, and from any other edge at its ends.
-constexpr double kRunUp_mm = 20;
-constexpr double kClear_mm = 10;
-/// Ends are moved outwards in steps until they have that room.
-constexpr double kEndStep_mm = 4;
-constexpr int kEndSteps = 15;
 /// Members this much longer than wide have a direction.
 constexpr double kSlender = 2;
-constexpr int kMustTell = 2;
-/// Slots narrower than this hide both sides: members are a little off.
-constexpr double kClosed_mm = 2;
-/// Places along a side that a pass across it may take.
-constexpr int kPlaces = 19;
-/// Where the part may lie is tried at so many places each way, and a pass added for no fewer than kWorthIt of
-/// them.
-constexpr int kTried = 7;
-constexpr int kWorthIt = 3;
-constexpr std::size_t kMostPasses = 3;
-
-struct Side {
-  Vec2 a, b, d, n;
-  double length;
-};
-
-Side side_of(const Polygon& outline, std::size_t k) {
-  const Segment s{outline[k % outline.size()], outline[(k + 1) % outline.size()]};
-  const Vec2 d = s.direction();
-  return {s.a, s.b, d, {d.y(), -d.x()}, s.length()};
-}
-
-Vec2 longest_direction(const Polygon& outline) {
-  Side best = side_of(outline, 0);
-  for (std::size_t k = 1; k < outline.size(); ++k) {
-    const Side s = side_of(outline, k);
-    if (s.length > best.length * (1 + 1e-9)) best = s;
-  }
-  return best.d;
-}
+/// Outlines whose corners lie closer than this are one.
+constexpr double kSameOutline_mm = 5;
 
 /// The side moved along its normal; its neighbours keep their lines where they stand steeply enough on it.
 Polygon with_side_moved(const Polygon& outline, std::size_t k, double by_mm) {
@@ -68,33 +29,11 @@ Polygon with_side_moved(const Polygon& outline, std::size_t k, double by_mm) {
   return out;
 }
 
-Box2 both(const Box2& a, const Box2& b) { return {a.min.cwiseMin(b.min), a.max.cwiseMax(b.max)}; }
-
-Polygon shifted(const Polygon& outline, const Vec2& by) {
-  Polygon out = outline;
-  for (Vec2& p : out) p += by;
-  return out;
-}
-
-struct Extent {
-  double low, high;
-  double size() const { return high - low; }
-};
-
-Extent extent(const Polygon& outline, const Vec2& axis) {
-  Extent out{axis.dot(outline.front()), axis.dot(outline.front())};
-  for (const Vec2& p : outline) {
-    out.low = std::min(out.low, axis.dot(p));
-    out.high = std::max(out.high, axis.dot(p));
-  }
-  return out;
-}
-
 void add_turns(const Polygon& outline, std::size_t member, double by_mm, std::vector<Departure>& out) {
   const Vec2 along = longest_direction(outline), across(-along.y(), along.x());
   const Extent length = extent(outline, along), width = extent(outline, across);
   if (length.size() < kSlender * width.size()) return;
-  const double middle = (width.low + width.high) / 2;
+  const double middle = width.middle();
   for (const bool far_end : {false, true}) {
     const Vec2 pivot = (far_end ? length.low : length.high) * along + middle * across;
     for (const double angle : {by_mm / length.size(), -by_mm / length.size()}) {
@@ -109,204 +48,41 @@ void add_turns(const Polygon& outline, std::size_t member, double by_mm, std::ve
   }
 }
 
-struct Met {
-  double at_mm;  ///< along the pass
-  Vec2 outward;
-};
-
-/// Crossings with the edges, each less its margin at both ends.
-std::vector<Met> met_by(const Segment& pass, std::span<const VisibleEdge> edges, double margin_mm) {
-  std::vector<Met> out;
-  const double length = pass.length();
-  for (const VisibleEdge& edge : edges) {
-    const double from = (pass.a - edge.line.a).dot(edge.outward),
-                 to = (pass.b - edge.line.a).dot(edge.outward);
-    if ((from < 0) == (to < 0) || std::abs(to - from) < kMinAcross * length) continue;
-    const double share = from / (from - to);
-    const double along = (pass.a + share * (pass.b - pass.a) - edge.line.a).dot(edge.line.direction());
-    if (along < margin_mm || along > edge.line.length() - margin_mm) continue;
-    out.push_back({share * length, edge.outward});
-  }
-  return out;
-}
-
-bool among(const Met& one, const std::vector<Met>& all) {
-  return std::any_of(all.begin(), all.end(), [&](const Met& other) {
-    return std::abs(other.at_mm - one.at_mm) < kSame_mm && other.outward.dot(one.outward) > 0.5;
+bool same_outline(const Polygon& a, const Polygon& b) {
+  return std::all_of(a.begin(), a.end(), [&](const Vec2& p) {
+    return std::any_of(b.begin(), b.end(), [&](const Vec2& q) { return (p - q).norm() < kSameOutline_mm; });
   });
-}
-
-bool apart(const Box2& a, const Box2& b) {
-  return (a.min.array() > b.max.array()).any() || (b.min.array() > a.max.array()).any();
-}
-
-/// Edges that the members show near the box, one of them with another outline, and in any of the boxes looked
-/// at; elsewhere they may lack cuts, or be missing.
-std::vector<VisibleEdge> edges_near(std::span<const Polygon> members, std::size_t member,
-                                    const Polygon& outline, const Box2& box,
-                                    std::span<const Box2> looked_at) {
-  std::vector<Polygon> beside;  // in their order, which decides who shows a piece that two share
-  for (std::size_t m = 0; m < members.size(); ++m) {
-    const Polygon& one = m == member ? outline : members[m];
-    if (one.empty()) continue;
-    const Box2 own = bounds(one);
-    if (!apart(own, box) &&
-        std::any_of(looked_at.begin(), looked_at.end(), [&](const Box2& b) { return !apart(own, b); }))
-      beside.push_back(one);
-  }
-  std::vector<VisibleEdge> out;
-  for (std::size_t m = 0; m < beside.size(); ++m) {
-    for (const VisibleEdge& edge : visible_edges(beside, m, kClosed_mm)) out.push_back(edge);
-  }
-  return out;
-}
-
-/// Whether the place lies within reach of an edge that the pass crosses.
-bool near_edge(const Vec2& place, std::span<const VisibleEdge> edges) {
-  return std::any_of(edges.begin(), edges.end(),
-                     [&](const VisibleEdge& e) { return distance(place, e.line) < kClear_mm; });
-}
-
-/// Ends moved outwards until no edge is within kClear_mm of them.
-Segment with_clear_ends(Segment pass, std::span<const VisibleEdge> edges) {
-  const Vec2 d = pass.direction();
-  for (int i = 0; i < kEndSteps && near_edge(pass.a, edges); ++i) pass.a -= kEndStep_mm * d;
-  for (int i = 0; i < kEndSteps && near_edge(pass.b, edges); ++i) pass.b += kEndStep_mm * d;
-  return pass;
-}
-
-/// All that a pass may come near to once its ends are clear.
-Box2 neighbourhood(const Segment& pass) {
-  Box2 out = bounds({pass.a, pass.b});
-  constexpr double kRoom_mm = kEndSteps * kEndStep_mm + kClear_mm;
-  out.min.array() -= kRoom_mm;
-  out.max.array() += kRoom_mm;
-  return out;
-}
-
-/// The part around a departure, drawn both ways, and the passes that may tell.
-struct Views {
-  std::vector<VisibleEdge> drawn, instead;
-  Box2 near;
-  std::vector<Segment> passes;
-};
-
-/// Square across the side, from one corner to the other.
-std::vector<Segment> passes_across(const Polygon& outline, const Departure& departure) {
-  const auto k = static_cast<std::size_t>(departure.side);
-  const Side side = side_of(outline, k), moved = side_of(departure.instead, k);
-  // The same both ways, so that one pass settles longer and shorter.
-  const double room = std::abs((moved.a - side.a).dot(side.n)) + kRunUp_mm;
-  std::vector<Segment> out;
-  for (int i = 1; i <= kPlaces; ++i) {
-    const Vec2 at = side.a + static_cast<double>(i) / (kPlaces + 1) * side.length * side.d;
-    out.push_back({at - room * side.n, at + room * side.n});
-  }
-  return out;
-}
-
-/// Across both sides of the end that swings, best first.
-std::vector<Segment> passes_near_end(const Polygon& outline, const Departure& departure) {
-  const Vec2 along = departure.outward, across(-along.y(), along.x());
-  const Extent length = extent(outline, along), width = extent(outline, across);
-  std::vector<Segment> out;
-  for (const double share : {0.85, 0.75, 0.65, 0.95}) {
-    const Vec2 at = (length.low + share * length.size()) * along;
-    out.push_back({at + (width.low - kRunUp_mm - kClear_mm) * across,
-                   at + (width.high + kRunUp_mm + kClear_mm) * across});
-  }
-  return out;
-}
-
-/// Of a part with many members only what the passes come near to is drawn, or else all that is near.
-enum class Drawn : std::uint8_t { AtPasses, Near };
-
-Views views_of(std::span<const Polygon> members, const Departure& departure, Drawn extent) {
-  const auto m = static_cast<std::size_t>(departure.member);
-  Views out;
-  out.near = departure.reach;
-  out.near.min.array() -= 5 * kRunUp_mm;
-  out.near.max.array() += 5 * kRunUp_mm;
-  out.passes =
-      departure.side >= 0 ? passes_across(members[m], departure) : passes_near_end(members[m], departure);
-  std::vector<Box2> looked_at{out.near};
-  if (extent == Drawn::AtPasses) {
-    looked_at.clear();
-    std::transform(out.passes.begin(), out.passes.end(), std::back_inserter(looked_at), neighbourhood);
-  }
-  out.drawn = edges_near(members, m, members[m], out.near, looked_at);
-  out.instead = edges_near(members, m, departure.instead, out.near, looked_at);
-  return out;
-}
-
-/// Of passes in order along a side the middle one of the longest row that tells, so that the part may lie a
-/// little aside.
-std::optional<std::size_t> middle_of_those_that_tell(const Views& views) {
-  std::optional<std::size_t> best;
-  std::size_t longest = 0, row = 0;
-  for (std::size_t i = 0; i < views.passes.size(); ++i) {
-    row = crossings_that_tell(views.drawn, views.instead, views.passes[i]) >= kMustTell ? row + 1 : 0;
-    if (row <= longest) continue;
-    longest = row;
-    best = i - row / 2;
-  }
-  return best;
-}
-
-std::optional<std::size_t> best_pass(const Views& views, const Departure& departure) {
-  if (departure.side >= 0) return middle_of_those_that_tell(views);
-  for (std::size_t i = 0; i < views.passes.size(); ++i) {
-    if (crossings_that_tell(views.drawn, views.instead, views.passes[i]) >= kMustTell) return i;
-  }
-  return std::nullopt;
-}
-
-/// Where the part may lie, a bit for each place that is tried.
-using Places = std::uint64_t;
-constexpr Places kEverywhere = (Places{1} << (kTried * kTried)) - 1;
-
-/// Where the passes tell, all together.
-Places told_by(const Views& views, std::span<const Segment> passes, double off_mm) {
-  std::array<int, kTried * kTried> told{};
-  for (const Segment& pass : passes) {
-    const Box2 own = bounds({pass.a, pass.b});
-    if ((own.min.array() > views.near.max.array()).any() || (views.near.min.array() > own.max.array()).any())
-      continue;
-    for (int i = 0; i < kTried * kTried; ++i) {
-      const Vec2 by = off_mm * (2.0 / (kTried - 1) * Vec2(i % kTried, i / kTried) - Vec2(1, 1));
-      told[static_cast<std::size_t>(i)] +=
-          crossings_that_tell(views.drawn, views.instead, {pass.a + by, pass.b + by});
-    }
-  }
-  Places out = 0;
-  for (std::size_t i = 0; i < told.size(); ++i) {
-    if (told[i] >= kMustTell) out |= Places{1} << i;
-  }
-  return out;
-}
-
-/// The `count` of the masks that tell in most places beside `told`, the first of equal ones.
-std::vector<std::size_t> best_together(const std::vector<Places>& masks, Places told, std::size_t count,
-                                       std::size_t from = 0) {
-  std::vector<std::size_t> best;
-  int most = -1;
-  for (std::size_t i = from; i < masks.size(); ++i) {
-    std::vector<std::size_t> chosen;
-    if (count > 1) chosen = best_together(masks, told | masks[i], count - 1, i + 1);
-    chosen.push_back(i);
-    Places all = told;
-    for (const std::size_t k : chosen) all |= masks[k];
-    if (chosen.size() < count || std::popcount(all) <= most) continue;
-    most = std::popcount(all);
-    best = std::move(chosen);
-  }
-  return best;
 }
 
 }  // namespace
 
 bool is_end(const Polygon& outline, std::size_t side) {
   return std::abs(side_of(outline, side).d.dot(longest_direction(outline))) < 0.8;
+}
+
+std::vector<Departure> turned_over(std::span<const Polygon> members, std::size_t member) {
+  std::vector<Departure> out;
+  const Polygon& outline = members[member];
+  if (outline.size() < 3) return out;
+  const Vec2 along = longest_direction(outline), across(-along.y(), along.x());
+  const double length = 2 * extent(outline, along).middle(), width = 2 * extent(outline, across).middle();
+  for (const auto& [over, round] : {std::pair{true, false}, std::pair{false, true}, std::pair{true, true}}) {
+    Departure other;
+    other.member = static_cast<int>(member);
+    other.over = true;
+    for (const Vec2& p : outline) {
+      const double x = p.dot(along), y = p.dot(across);
+      other.instead.push_back((round ? length - x : x) * along + (over ? width - y : y) * across);
+    }
+    if (over != round) std::reverse(other.instead.begin(), other.instead.end());
+    if (same_outline(other.instead, outline) || std::any_of(out.begin(), out.end(), [&](const Departure& d) {
+          return same_outline(other.instead, d.instead);
+        }))
+      continue;
+    other.reach = both(bounds(outline), bounds(other.instead));
+    out.push_back(std::move(other));
+  }
+  return out;
 }
 
 std::vector<Departure> departures(std::span<const Polygon> members, std::span<const VisibleEdge> visible,
@@ -340,6 +116,8 @@ std::vector<Departure> departures(std::span<const Polygon> members, std::span<co
     }
   }
   add_turns(outline, member, by_mm, out);
+  std::vector<Departure> over = turned_over(members, member);
+  std::move(over.begin(), over.end(), std::back_inserter(out));
   return out;
 }
 
@@ -360,56 +138,6 @@ std::vector<Departure> shifts(std::span<const Polygon> members, std::size_t memb
   }
   std::stable_sort(out.begin(), out.end(),
                    [&](const Departure& a, const Departure& b) { return moves(a) > moves(b); });
-  return out;
-}
-
-int crossings_that_tell(std::span<const VisibleEdge> drawn, std::span<const VisibleEdge> instead,
-                        const Segment& pass) {
-  // What one has for sure and the other not even near the end of an edge.
-  const auto only_in = [&](std::span<const VisibleEdge> one, std::span<const VisibleEdge> other) {
-    const std::vector<Met> sure = met_by(pass, one, kEndMargin_mm),
-                           maybe = met_by(pass, other, -kEndMargin_mm);
-    return static_cast<int>(
-        std::count_if(sure.begin(), sure.end(), [&](const Met& m) { return !among(m, maybe); }));
-  };
-  return only_in(drawn, instead) + only_in(instead, drawn);
-}
-
-std::optional<Segment> telling_pass(std::span<const Polygon> members, const Departure& departure) {
-  const Views views = views_of(members, departure, Drawn::AtPasses);
-  const std::optional<std::size_t> best = best_pass(views, departure);
-  if (!best) return std::nullopt;
-  return with_clear_ends(views.passes[*best], views.drawn);
-}
-
-std::vector<Segment> settling_passes(std::span<const Polygon> members, const Departure& departure,
-                                     std::span<const Segment> laid, double off_mm) {
-  std::vector<Segment> out;
-  const Views views = views_of(members, departure, Drawn::Near);
-  const std::optional<std::size_t> best = best_pass(views, departure);
-  if (!best) return out;
-  const Places told = told_by(views, laid, off_mm);
-  if (told == kEverywhere) return out;
-  // Nearest to the best one first, which wins where several settle as much.
-  std::vector<Segment> passes = views.passes;
-  std::stable_sort(passes.begin(), passes.end(), [&](const Segment& a, const Segment& b) {
-    return (a.a - views.passes[*best].a).norm() < (b.a - views.passes[*best].a).norm();
-  });
-  std::vector<Places> masks;
-  for (const Segment& pass : passes) {
-    masks.push_back(told_by(views, {&pass, 1}, off_mm));
-    if ((masks.back() | told) == kEverywhere) break;
-  }
-  int settled = std::popcount(told);
-  for (std::size_t count = 1; count <= kMostPasses && settled < std::popcount(kEverywhere); ++count) {
-    Places with = told;
-    const std::vector<std::size_t> chosen = best_together(masks, told, count);
-    for (const std::size_t k : chosen) with |= masks[k];
-    if (std::popcount(with) < settled + kWorthIt) break;
-    settled = std::popcount(with);
-    out.clear();
-    for (const std::size_t k : chosen) out.push_back(with_clear_ends(passes[k], views.drawn));
-  }
   return out;
 }
 

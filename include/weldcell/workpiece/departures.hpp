@@ -11,23 +11,29 @@
 namespace weldcell::workpiece {
 
 /// One member other than drawn: a side moved along its normal (longer, shorter, wider, narrower), the member
-/// shifted along itself, or turned about one of its ends.
+/// shifted along itself, turned about one of its ends, or put in its place turned over.
 struct Departure {
   int member = -1;
-  int side = -1;       ///< the side that moves, of a shift the end that it moves away from; -1: turned
+  int side = -1;       ///< the side that moves, of a shift the end that it moves away from; -1: turned, over
   bool whole = false;  ///< the member is shifted
+  bool over = false;   ///< turned over about its axis, end for end, or both
   bool end = false;    ///< an end of the member: the side runs across its longest one
   Vec2 outward{0, 0};  ///< unit; of the side, or of the end that swings
   Polygon instead;     ///< the member's outline then, frame Part
   Box2 reach;          ///< what is other than drawn lies in here
 };
 
-/// All departures of one member by by_mm (at the swinging end of a turn); `visible` are the visible edges of
-/// the part as drawn. Ends in the open move only with their member unless free_ends: a longer or shorter one
-/// changes no joint. Left out are sides shorter than 8 mm, what would leave less than half of the member, and
-/// sides that would move out through a joint that hides most of them: there another member is.
+/// All departures of one member by by_mm (at the swinging end of a turn), turned over ones included;
+/// `visible` are the visible edges of the part as drawn. Ends in the open move only with their member unless
+/// free_ends: a longer or shorter one changes no joint. Left out are sides shorter than 8 mm, what would
+/// leave less than half of the member, and sides that would move out through a joint that hides most of them:
+/// there another member is.
 std::vector<Departure> departures(std::span<const Polygon> members, std::span<const VisibleEdge> visible,
                                   std::size_t member, double by_mm, bool free_ends);
+
+/// The member turned over about the middle of its length, of its width, and of both, each in the place where
+/// it is; those that leave the outline as it is to 5 mm are left out, of two that are alike one.
+std::vector<Departure> turned_over(std::span<const Polygon> members, std::size_t member);
 
 /// One member shifted as it is, by that much, frame Part: once for each side that would move, the farthest
 /// first.

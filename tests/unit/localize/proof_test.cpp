@@ -118,6 +118,43 @@ TEST(Proof, TwoLostCrossingsAloneNameTheMember) {
   EXPECT_NE(found.reason.find("rung_1"), std::string::npos) << found.reason;
 }
 
+TEST(Proof, AMitredMemberTurnedOverIsNamed) {
+  const auto frame = [](bool over) {
+    Workpiece w;
+    w.name = "frame";
+    w.height_mm = 40;
+    const auto member = [](const char* name, std::vector<Vec2> outline) {
+      workpiece::Member m;
+      m.name = m.tag = name;
+      m.outline = std::move(outline);
+      return m;
+    };
+    w.members = {over ? member("low", {{-300, -250}, {300, -250}, {350, -200}, {-350, -200}})
+                      : member("low", {{-350, -250}, {350, -250}, {300, -200}, {-300, -200}}),
+                 member("right", {{350, -250}, {350, 250}, {300, 200}, {300, -200}}),
+                 member("high", {{350, 250}, {-350, 250}, {-300, 200}, {300, 200}}),
+                 member("left", {{-350, 250}, {-350, -250}, {-300, -200}, {-300, 200}}),
+                 box("post", {40, -200}, {90, 200})};
+    return *workpiece::validated(std::move(w));
+  };
+  const Localizer drawn(*workpiece::build_template(frame(false)));
+  const auto there = workpiece::build_template(frame(true));
+  ASSERT_TRUE(there.ok());
+  std::vector<PathPiece> lines;
+  for (double at = -390; at < 400; at += 30) {
+    lines.push_back({-400, at, 400, at});
+    lines.push_back({at, 400, at, -400});
+  }
+  Scan good, wrong;
+  scan(drawn.outline(), lines, 10, good);
+  EXPECT_EQ(drawn.localize(good.edges, good.path, {}).verdict, Verdict::Weld);
+  scan(*there, lines, 11, wrong);
+  const Localization found = drawn.localize(wrong.edges, wrong.path, {});
+  EXPECT_EQ(found.verdict, Verdict::Reject) << found.reason;
+  EXPECT_EQ(found.cause, "wrong_revision") << found.reason;
+  EXPECT_NE(found.reason.find("low lies turned over"), std::string::npos) << found.reason;
+}
+
 TEST(Proof, NothingIsAskedWithoutAPathOrWhenSwitchedOff) {
   Scan seen;
   scan(drawing().outline(), blind_lines(), 5, seen);

@@ -130,6 +130,27 @@ TEST(Departures, AShiftIsAskedAcrossTheSideThatMovesFarthest) {
   EXPECT_NEAR(pass->a.y(), pass->b.y(), 1e-9) << "square across a long side";
 }
 
+TEST(Departures, AMitredMemberMayLieTurnedOverAndABarMayNot) {
+  const auto bars = build_template(frame());
+  ASSERT_TRUE(bars.ok());
+  EXPECT_TRUE(turned_over(bars->members, kPost).empty()) << "the same bar whichever way round";
+  // Of the frame's lower rail the ends are mitred: turned over its long side lies inside.
+  const std::vector<Polygon> mitred{{{0, 0}, {800, 0}, {750, 50}, {50, 50}},
+                                    {{800, 0}, {800, 500}, {750, 450}, {750, 50}}};
+  const std::vector<Departure> over = turned_over(mitred, 0);
+  ASSERT_EQ(over.size(), 1U) << "end for end it is the same, and both are like the first";
+  EXPECT_TRUE(over.front().over);
+  EXPECT_GT(signed_area(over.front().instead), 0);
+  double long_side_y = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Segment side{over.front().instead[k], over.front().instead[(k + 1) % 4]};
+    if (side.length() > 790) long_side_y = side.a.y();
+  }
+  EXPECT_NEAR(long_side_y, 50, 1e-9);
+  const auto pass = telling_pass(mitred, over.front());
+  ASSERT_TRUE(pass.has_value());
+}
+
 TEST(Departures, CrossingsThatTell) {
   const auto part = build_template(frame());
   ASSERT_TRUE(part.ok());
