@@ -9,8 +9,10 @@ namespace weldcell::localize {
 
 namespace {
 
-/// Of a member that is off in everything; so wide a prior pays for itself besides.
-constexpr double kWide_nats = 2;
+/// Odds against a member's being off in everything; so wide a prior pays for itself besides. Less where it is
+/// the only way that is asked for.
+constexpr double kWide_nats = 4;
+constexpr double kWideOfFew_nats = 2;
 /// Of one that is off in one way only, so that many a member within its tolerance would look so; along itself
 /// that hardly moves the pose.
 constexpr double kPulled_nats = 6;
@@ -30,12 +32,13 @@ std::vector<std::size_t> first_of(Ordered& order) {
   return out;
 }
 
-}  // namespace
-
-double odds_nats(Freedom freedom) {
+double odds_nats(Freedom freedom, bool of_few) {
   if (freedom == Freedom::Along) return kAlong_nats;
-  return freedom == Freedom::Pulled ? kPulled_nats : kWide_nats;
+  if (freedom == Freedom::Pulled) return kPulled_nats;
+  return of_few ? kWideOfFew_nats : kWide_nats;
 }
+
+}  // namespace
 
 bool few(const Freedoms& freedoms) { return freedoms.size() < kFewestTelling; }
 
@@ -50,8 +53,10 @@ std::vector<Hypothesis> hypotheses(const NormalEquations& equations, const Freed
   }
   const std::vector<double> evidence = equations.evidence_with(rest, each, latencies_ms);
   std::vector<Hypothesis> out;
-  for (std::size_t i = 0; i < each.size(); ++i)
-    out.push_back({each[i], evidence[i] - odds_nats(each[i].freedom)});
+  for (std::size_t i = 0; i < each.size(); ++i) {
+    const double odds = odds_nats(each[i].freedom, few(rest));
+    out.push_back({each[i], evidence[i] - odds, odds});
+  }
   return out;
 }
 

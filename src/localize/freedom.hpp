@@ -11,11 +11,9 @@ namespace weldcell::localize {
 /// One member off in one way, the rest as drawn or as given.
 struct Hypothesis {
   Freed freed;
-  double nats = 0;  ///< log-evidence less odds_nats()
+  double nats = 0;       ///< log-evidence less the odds
+  double odds_nats = 0;  ///< against the member's being off in this way, before the points speak
 };
-
-/// Odds against a member's being off in this way, before the points speak.
-double odds_nats(Freedom freedom);
 
 /// Too few members do not tell in what one of them is off: there they are free altogether or not at all.
 bool few(const Freedoms& freedoms);

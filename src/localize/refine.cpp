@@ -275,8 +275,8 @@ class Refinement {
         Freedoms freedoms = drawn;
         freedoms[member] = h.freed.freedom;
         for (Weighed& w : answers(equations, freedoms)) {
-          w.log_weight -= odds_nats(h.freed.freedom);
-          w.log_bet -= odds_nats(h.freed.freedom);
+          w.log_weight -= h.odds_nats;
+          w.log_bet -= h.odds_nats;
           out.push_back(std::move(w));
         }
       }
