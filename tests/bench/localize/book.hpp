@@ -46,7 +46,7 @@ class Book {
 
 // The sections; each adds its rows and leaves out cells that are not wanted.
 void accuracy(Book& book);          // RMS against the bound, NEES, wrong verdicts
-void frontier(Book& book);          // what any rule can reach with two members
+void frontier(Book& book);          // what any rule can reach with two to five members
 void basin(Book& book);             // wide and extreme placements, the hard set
 void latency(Book& book);           // 8 ms between robot and sensor
 void wrong_parts(Book& book);       // mirrored, moved, missing, swapped, lengthened, turned
