@@ -120,9 +120,16 @@ Alternatives::Alternatives(const workpiece::OutlineTemplate& outline, const std:
       -std::log((missed + kMissedBefore) / (evidence.expected + kMissedBefore + kSeenBefore)), 0.3, 5.0);
 }
 
-Alternatives::Region Alternatives::around(std::size_t member) const {
-  return inside(grown(boxes_[member], kMost_mm + kRoom_mm));
+Box2 Alternatives::reach_of(std::size_t member) const { return grown(boxes_[member], kMost_mm + kRoom_mm); }
+
+bool Alternatives::holds_free(const Box2& box) const {
+  for (auto s = first_from(box.min.x()); s != spots_.end() && s->place.x() <= box.max.x(); ++s) {
+    if (s->free && in_box(s->place, box)) return true;
+  }
+  return false;
 }
+
+Alternatives::Region Alternatives::around(std::size_t member) const { return inside(reach_of(member)); }
 
 Alternatives::Region Alternatives::inside(const Box2& box) const {
   Region out;
@@ -190,14 +197,14 @@ std::vector<VisibleEdge> Alternatives::visible(const Variant& part, std::size_t 
   // shows a piece that two share.
   if (outline_of(part, member).empty()) return {};
   const Box2 near = common(grown(box_of(part, member), kBeside_mm), grown(region.box, kBeyond_mm));
-  std::vector<Polygon> beside;
+  std::vector<const Polygon*> beside;
   std::size_t own = 0;
   for (const std::size_t m : region.near) {
     if (m != member && apart(box_of(part, m), near)) continue;
     const Polygon& outline = outline_of(part, m);
     if (outline.empty()) continue;
     if (m == member) own = beside.size();
-    beside.push_back(outline);
+    beside.push_back(&outline);
   }
   std::vector<VisibleEdge> out = workpiece::visible_edges(beside, own, region.joint_gap_mm);
   for (VisibleEdge& edge : out) edge.member = static_cast<int>(member);
@@ -423,10 +430,8 @@ Displacement Alternatives::displaced(int member, bool anywhere) const {
   Displacement best;
   best.member = member;
   if (members_[m].empty()) return best;
+  if (unseen_[m] == 0 && !holds_free(reach_of(m))) return best;
   Region region = around(m);
-  const bool idle =
-      std::none_of(region.spots.begin(), region.spots.end(), [](const Spot& s) { return s.free; });
-  if (idle && unseen_[m] == 0) return best;
   note_near(m, region);
   displaced_from(members_[m], anywhere, region, best);
   // A fit that followed a displaced member half the way has turned it as well.

@@ -88,6 +88,9 @@ class Alternatives {
     std::vector<std::size_t> near;
   };
 
+  /// Where a member may show, displaced or not.
+  Box2 reach_of(std::size_t member) const;
+  bool holds_free(const Box2& box) const;
   Region around(std::size_t member) const;
   Region inside(const Box2& box) const;
   Region everywhere() const;

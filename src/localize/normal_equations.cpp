@@ -1,7 +1,6 @@
 #include "normal_equations.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -111,7 +110,7 @@ NormalEquations::Block NormalEquations::block(std::size_t member) const {
   Eigen::Matrix3d to_member = Eigen::Matrix3d::Identity();
   to_member(2, 0) = m.y();
   to_member(2, 1) = -m.x();
-  const Eigen::Matrix<double, 3, 6> cross = to_member * full.topRows<3>();
+  const Shared cross = to_member * full.topRows<3>();
   return {cross.leftCols<3>() * to_member.transpose(), cross};
 }
 
@@ -129,38 +128,49 @@ Eigen::Vector3d NormalEquations::prior_sigma(std::size_t member, double k, Freed
   return sigma;
 }
 
-Eigen::Matrix3d NormalEquations::posterior(std::size_t member, double k, Freedom freedom, const Block& block,
-                                           double& log_determinant) const {
+NormalEquations::Own NormalEquations::own_shift(std::size_t member, double k, Freedom freedom,
+                                                const Block& block) const {
+  Own out;
+  if (k <= 0 && freedom == Freedom::Held) return out;
   const Eigen::Vector3d sigma = prior_sigma(member, k, freedom);
-  log_determinant = 0;
-  if (k <= 0 && freedom == Freedom::Held) return Eigen::Matrix3d::Zero();
-  // S^1/2 (I + S^1/2 G S^1/2)^-1 S^1/2: no division by a prior that may be tiny. G along the member's own
-  // axes where these differ.
-  const Eigen::Matrix3d both = sigma * sigma.transpose();
-  if (sigma(0) == sigma(1)) {
-    if (!touches(member)) return sigma.cwiseAbs2().asDiagonal();
-    const Eigen::Matrix3d inner = Eigen::Matrix3d::Identity() + block.gram.cwiseProduct(both);
-    log_determinant = std::log(inner.determinant());
-    return inner.inverse().cwiseProduct(both);
-  }
-  const Vec2& d = frames_[member].axis;
+  // Along the member's own axes where sigmas differ.
+  const bool turned = sigma(0) != sigma(1);
+  const Vec2& axis = frames_[member].axis;
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
-  axes.topLeftCorner<2, 2>() << d.x(), -d.y(), d.y(), d.x();
-  if (!touches(member)) return axes * sigma.cwiseAbs2().asDiagonal() * axes.transpose();
-  const Eigen::Matrix3d gram = axes.transpose() * block.gram * axes;
-  const Eigen::Matrix3d inner = Eigen::Matrix3d::Identity() + gram.cwiseProduct(both);
-  log_determinant = std::log(inner.determinant());
-  return axes * inner.inverse().cwiseProduct(both) * axes.transpose();
+  axes.topLeftCorner<2, 2>() << axis.x(), -axis.y(), axis.y(), axis.x();
+  out.root = sigma.asDiagonal();
+  out.d.setOnes();
+  if (touches(member)) {
+    const Block own =
+        turned ? Block{axes.transpose() * block.gram * axes, axes.transpose() * block.cross} : block;
+    // No division by a prior that may be tiny.
+    const Eigen::Matrix3d inner =
+        Eigen::Matrix3d::Identity() + own.gram.cwiseProduct(sigma * sigma.transpose());
+    const double d0 = inner(0, 0), l10 = inner(1, 0) / d0, l20 = inner(2, 0) / d0;
+    const double d1 = inner(1, 1) - l10 * inner(1, 0);
+    const double below = inner(2, 1) - l20 * inner(1, 0), l21 = below / d1;
+    const double d2 = inner(2, 2) - l20 * inner(2, 0) - l21 * below;
+    out.d << 1 / d0, 1 / d1, 1 / d2;
+    out.log_determinant = std::log(d0 * d1 * d2);
+    out.root(1, 0) = -l10 * sigma(0);
+    out.root(2, 0) = (l21 * l10 - l20) * sigma(0);
+    out.root(2, 1) = -l21 * sigma(1);
+    out.half.row(0) = sigma(0) * own.cross.row(0);
+    out.half.row(1) = sigma(1) * own.cross.row(1) - l10 * out.half.row(0);
+    out.half.row(2) = sigma(2) * own.cross.row(2) - l20 * out.half.row(0) - l21 * out.half.row(1);
+  }
+  if (turned) out.root *= axes.transpose();
+  return out;
 }
 
-void NormalEquations::eliminate(std::size_t member, double k, Freedom freedom, const Block& block, int sign,
-                                Reduced& left) const {
-  if (!touches(member) || (k <= 0 && freedom == Freedom::Held)) return;
-  double log_determinant = 0;
-  const Eigen::Matrix3d own = posterior(member, k, freedom, block, log_determinant);
-  const Eigen::Matrix<double, 3, 6> carry = sign * own * block.cross;
-  left.sums.noalias() -= block.cross.transpose() * carry;
-  left.log_determinant += sign * log_determinant;
+void NormalEquations::eliminate(const Own& own, int sign, Reduced& left) {
+  if (own.d(0) == 0) return;
+  for (int j = 0; j < 6; ++j) {
+    const Eigen::Vector3d weighed = sign * own.d.cwiseProduct(own.half.col(j));
+    left.sums.col(j) -= weighed(0) * own.half.row(0).transpose() + weighed(1) * own.half.row(1).transpose() +
+                        weighed(2) * own.half.row(2).transpose();
+  }
+  left.log_determinant += sign * own.log_determinant;
 }
 
 /// Members as drawn.
@@ -199,12 +209,8 @@ std::vector<Solution> NormalEquations::solve_common(double k, const Freedoms& fr
   Reduced left = rigid;
   own.resize(sums_.size());
   for (std::size_t m = 0; m < sums_.size(); ++m) {
-    double log_determinant = 0;
-    own[m].posterior = posterior(m, k, freedoms[m], blocks[m], log_determinant);
-    if (!touches(m) || log_determinant == 0) continue;
-    own[m].carry.noalias() = own[m].posterior * blocks[m].cross;
-    left.sums.noalias() -= blocks[m].cross.transpose() * own[m].carry;
-    left.log_determinant += log_determinant;
+    own[m] = own_shift(m, k, freedoms[m], blocks[m]);
+    if (touches(m)) eliminate(own[m], 1, left);
   }
   std::vector<Solution> out;
   for (const double latency_ms : latencies_ms) {
@@ -224,11 +230,12 @@ std::vector<Solution> NormalEquations::solve_common(double k, const Freedoms& fr
 void NormalEquations::solve_members(const std::vector<Own>& own, Detail detail, Solution& solution) const {
   for (std::size_t m = 0; m < sums_.size(); ++m) {
     MemberSolution& member = solution.members[m];
-    const auto carry = own[m].carry.leftCols<5>();
-    member.shift = own[m].carry.col(5) - carry * solution.common;
+    const Own& o = own[m];
+    const Eigen::Matrix3d back = o.root.transpose() * o.d.asDiagonal();
+    member.shift = back * (o.half.col(5) - o.half.leftCols<5>() * solution.common);
     if (detail == Detail::Shifts) continue;
-    member.covariance = own[m].posterior;
-    if (touches(m)) member.covariance += carry * solution.covariance * carry.transpose();
+    const Eigen::Matrix<double, 3, 5> carry = back * o.half.leftCols<5>();
+    member.covariance = o.posterior() + carry * solution.covariance * carry.transpose();
   }
 }
 
@@ -302,7 +309,8 @@ double NormalEquations::evidence(const Freedoms& freedoms) const {
   double best = -1e300;
   outwards(each.size(), [&](std::size_t i) {
     Reduced left = undivided;
-    for (std::size_t m = 0; m < sums_.size(); ++m) eliminate(m, each[i].k, freedoms[m], all[m], 1, left);
+    for (std::size_t m = 0; m < sums_.size(); ++m)
+      if (touches(m)) eliminate(own_shift(m, each[i].k, freedoms[m], all[m]), 1, left);
     logs.push_back(evidence_of(left) + each[i].log_weight);
     best = std::max(best, logs.back());
     return logs.back() > best - kHopeless_nats;
@@ -319,13 +327,14 @@ std::vector<double> NormalEquations::evidence_with(const Freedoms& freedoms, con
   std::vector<double> best(tried.size(), -1e300);
   outwards(each.size(), [&](std::size_t scale) {
     Reduced held = undivided;
-    for (std::size_t m = 0; m < sums_.size(); ++m) eliminate(m, each[scale].k, freedoms[m], all[m], 1, held);
+    for (std::size_t m = 0; m < sums_.size(); ++m)
+      if (touches(m)) eliminate(own_shift(m, each[scale].k, freedoms[m], all[m]), 1, held);
     bool matters = false;
     for (std::size_t i = 0; i < tried.size(); ++i) {
       const std::size_t m = tried[i].member;
       Reduced other = held;
-      eliminate(m, each[scale].k, freedoms[m], all[m], -1, other);
-      eliminate(m, each[scale].k, tried[i].freedom, all[m], 1, other);
+      eliminate(own_shift(m, each[scale].k, freedoms[m], all[m]), -1, other);
+      eliminate(own_shift(m, each[scale].k, tried[i].freedom, all[m]), 1, other);
       for (const double latency_ms : latencies_ms) {
         Reduced total = other;
         add_prior(latency_ms, total);

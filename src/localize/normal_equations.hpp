@@ -85,10 +85,11 @@ class NormalEquations {
 
  private:
   using Sums = Eigen::Matrix<double, 6, 6>;  ///< of (a, l, b, residual)
-  /// What a member's shift shares with itself and with all else, about the member's centroid.
+  using Shared = Eigen::Matrix<double, 3, 6, Eigen::RowMajor>;
+  /// What a member's shift shares with itself and with (a, l, b, residual), about the member's centroid.
   struct Block {
     Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
-    Eigen::Matrix<double, 3, 6> cross = Eigen::Matrix<double, 3, 6>::Zero();  ///< with (a, l, b, residual)
+    Shared cross = Shared::Zero();
   };
   /// What is left to the common parameters once the members' own shifts are eliminated.
   struct Reduced {
@@ -99,21 +100,22 @@ class NormalEquations {
     double square() const { return sums(5, 5); }
   };
   struct Scale;
-  /// A member's shift given the common parameters: its covariance, and how it follows from (a, l, b) and from
-  /// the residuals.
+  /// A member's own shift, eliminated: with prior sigmas S along its axes A and gram G,
+  /// I + S A' G A S = L diag(1/d) L'.
   struct Own {
-    Eigen::Matrix3d posterior = Eigen::Matrix3d::Zero();
-    Eigen::Matrix<double, 3, 6> carry = Eigen::Matrix<double, 3, 6>::Zero();
+    Eigen::Matrix3d root = Eigen::Matrix3d::Zero();  ///< L^-1 S A'
+    Eigen::Vector3d d = Eigen::Vector3d::Zero();     ///< 0: held where it is drawn
+    Shared half = Shared::Zero();                    ///< L^-1 S A' cross
+    double log_determinant = 0;
+    /// Covariance of the shift given the common parameters.
+    Eigen::Matrix3d posterior() const { return root.transpose() * d.asDiagonal() * root; }
   };
   Block block(std::size_t member) const;
   /// Of a member along itself, across and turned.
   Eigen::Vector3d prior_sigma(std::size_t member, double k, Freedom freedom) const;
-  /// Covariance of a member's shift given the common parameters.
-  Eigen::Matrix3d posterior(std::size_t member, double k, Freedom freedom, const Block& block,
-                            double& log_determinant) const;
+  Own own_shift(std::size_t member, double k, Freedom freedom, const Block& block) const;
   /// Takes a member's own shift out of what is left (sign 1), or puts it back (-1).
-  void eliminate(std::size_t member, double k, Freedom freedom, const Block& block, int sign,
-                 Reduced& left) const;
+  static void eliminate(const Own& own, int sign, Reduced& left);
   Reduced rigid() const;
   void add_prior(double latency_ms, Reduced& left) const;
   std::vector<Block> blocks() const;

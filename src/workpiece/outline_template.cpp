@@ -1,6 +1,7 @@
 #include "weldcell/workpiece/outline_template.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "self_similarity.hpp"
@@ -39,13 +40,16 @@ Segment shifted(const Segment& s, const Vec2& by) { return {s.a + by, s.b + by};
 struct Cover {
   const Polygon* polygon = nullptr;
   Box2 box;  ///< what it can hide lies in here
-  std::vector<double>
-      offsets_mm;  ///< along the outward normal: the side is hidden where a so shifted point is inside
+  /// Along the outward normal: the side is hidden where a so shifted point is inside. So many of them count.
+  std::array<double, 3> offset_mm{};
+  std::size_t count = 0;
+  std::span<const double> offsets_mm() const { return {offset_mm.data(), count}; }
 };
 
 bool hidden_by(const Cover& cover, const Vec2& p, const Vec2& outward) {
   if ((p.array() < cover.box.min.array()).any() || (p.array() > cover.box.max.array()).any()) return false;
-  return std::any_of(cover.offsets_mm.begin(), cover.offsets_mm.end(),
+  const std::span<const double> offsets = cover.offsets_mm();
+  return std::any_of(offsets.begin(), offsets.end(),
                      [&](double offset) { return contains(*cover.polygon, p + offset * outward); });
 }
 
@@ -59,6 +63,7 @@ std::vector<Stretch> stretches(const Segment& side, const std::vector<Cover>& co
   const Box2 own{side.a.cwiseMin(side.b), side.a.cwiseMax(side.b)};
   const Vec2 d = side.b - side.a;
   std::vector<Stretch> out;
+  out.reserve(covers.size());
   for (const Cover& cover : covers) {
     if (apart(own, cover.box, 0)) continue;
     const Vec2 half = (cover.box.max - cover.box.min) / 2;
@@ -76,7 +81,7 @@ std::vector<std::pair<double, double>> visible_intervals(const Segment& side, co
   const std::vector<Stretch> near = stretches(side, covers);
   std::vector<double> cuts{0, 1};
   for (const Stretch& stretch : near) {
-    for (const double offset : stretch.cover->offsets_mm)
+    for (const double offset : stretch.cover->offsets_mm())
       append_crossings(shifted(side, offset * outward), *stretch.cover->polygon, cuts);
   }
   std::sort(cuts.begin(), cuts.end());
@@ -101,19 +106,20 @@ std::vector<std::pair<double, double>> visible_intervals(const Segment& side, co
 }
 
 /// Of two members that share a piece of silhouette only the first one shows it.
-std::vector<Cover> covers_of(std::span<const Polygon> members, std::size_t member, double joint_gap_mm) {
+std::vector<Cover> covers_of(std::span<const Polygon* const> members, std::size_t member,
+                             double joint_gap_mm) {
   std::vector<Cover> covers;
-  const Box2 own = bounds(members[member]);
+  covers.reserve(members.size());
+  const Box2 own = bounds(*members[member]);
   for (std::size_t j = 0; j < members.size(); ++j) {
-    if (j == member || members[j].empty()) continue;
-    const Box2 box = bounds(members[j]);
+    if (j == member || members[j]->empty()) continue;
+    const Box2 box = bounds(*members[j]);
     const double reach = 2 * joint_gap_mm + kTouch_mm;
     if (apart(own, box, reach)) continue;
-    Cover cover{&members[j],
-                {Vec2(box.min.array() - reach), Vec2(box.max.array() + reach)},
-                {joint_gap_mm, kTouch_mm}};
-    if (j < member) cover.offsets_mm.push_back(-kTouch_mm);
-    covers.push_back(std::move(cover));
+    covers.push_back({members[j],
+                      {Vec2(box.min.array() - reach), Vec2(box.max.array() + reach)},
+                      {joint_gap_mm, kTouch_mm, -kTouch_mm},
+                      j < member ? 3U : 2U});
   }
   return covers;
 }
@@ -130,9 +136,18 @@ double longest_side(const Polygon& polygon) {
 
 std::vector<VisibleEdge> visible_edges(std::span<const Polygon> members, std::size_t member,
                                        double joint_gap_mm) {
+  std::vector<const Polygon*> each;
+  each.reserve(members.size());
+  for (const Polygon& polygon : members) each.push_back(&polygon);
+  return visible_edges(each, member, joint_gap_mm);
+}
+
+std::vector<VisibleEdge> visible_edges(std::span<const Polygon* const> members, std::size_t member,
+                                       double joint_gap_mm) {
   std::vector<VisibleEdge> out;
-  const Polygon& outline = members[member];
+  const Polygon& outline = *members[member];
   if (outline.empty()) return out;
+  out.reserve(outline.size());
   const std::vector<Cover> covers = covers_of(members, member, joint_gap_mm);
   // A mitre's tip stays uncovered over about one joint gap; it is no edge that a laser could see.
   const double shortest = std::max(1.0, 2 * joint_gap_mm);
