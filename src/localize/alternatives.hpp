@@ -58,6 +58,13 @@ class Alternatives {
   static constexpr double kJointGap_mm = 0.5;
 
  private:
+  /// A point this close to an edge lies on it: noise, and members that are a little off.
+  static constexpr double kOnEdge_mm = 1.5;
+  /// A side tells nothing about a step against it, nor along it.
+  static constexpr double kAgainst = -0.15;
+  /// A crossing more along an edge than this may be missed.
+  static constexpr double kMinAcross = 0.35;
+
   struct Spot {
     Vec2 place, inward;                   ///< frame Part
     bool directed = false, free = false;  ///< free: no edge of the drawing claims it
