@@ -99,26 +99,4 @@ Box2 bounds(const Polygon& polygon) {
   return box;
 }
 
-Box2 grown(const Box2& box, double by_mm) {
-  return {Vec2(box.min.array() - by_mm), Vec2(box.max.array() + by_mm)};
-}
-
-Box2 intersection(const Box2& a, const Box2& b) { return {a.min.cwiseMax(b.min), a.max.cwiseMin(b.max)}; }
-
-bool apart(const Box2& a, const Box2& b) {
-  return (a.min.array() > b.max.array()).any() || (b.min.array() > a.max.array()).any();
-}
-
-bool contains(const Box2& box, const Vec2& p) {
-  return (p.array() >= box.min.array()).all() && (p.array() <= box.max.array()).all();
-}
-
-bool meets(const Segment& s, const Box2& box) {
-  if (apart({s.a.cwiseMin(s.b), s.a.cwiseMax(s.b)}, box)) return false;
-  // No axis tells them apart, then, but the segment's normal.
-  const Vec2 d = s.b - s.a, half = (box.max - box.min) / 2;
-  const double reach = half.x() * std::abs(d.y()) + half.y() * std::abs(d.x());
-  return std::abs(cross(d, box.min + half - s.a)) <= reach + 1e-9 * d.squaredNorm();
-}
-
 }  // namespace weldcell

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <numeric>
 
+#include "boxes.hpp"
+
 namespace weldcell::localize {
 
 namespace {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "alternatives.hpp"
+#include "boxes.hpp"
 
 namespace weldcell::localize {
 

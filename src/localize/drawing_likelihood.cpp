@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "alternatives.hpp"
+#include "boxes.hpp"
 
 namespace weldcell::localize {
 

@@ -61,6 +61,10 @@ bool among(const Met& one, const std::vector<Met>& all) {
   });
 }
 
+bool apart(const Box2& a, const Box2& b) {
+  return (a.min.array() > b.max.array()).any() || (b.min.array() > a.max.array()).any();
+}
+
 /// Edges that the members show near the box, one of them with another outline, and in any of the boxes looked
 /// at; elsewhere they may lack cuts, or be missing.
 std::vector<VisibleEdge> edges_near(std::span<const Polygon> members, std::size_t member,
@@ -98,7 +102,11 @@ Segment with_clear_ends(Segment pass, std::span<const VisibleEdge> edges) {
 
 /// All that a pass may come near to once its ends are clear.
 Box2 neighbourhood(const Segment& pass) {
-  return grown(bounds({pass.a, pass.b}), kEndSteps * kEndStep_mm + kClear_mm);
+  Box2 out = bounds({pass.a, pass.b});
+  constexpr double kRoom_mm = kEndSteps * kEndStep_mm + kClear_mm;
+  out.min.array() -= kRoom_mm;
+  out.max.array() += kRoom_mm;
+  return out;
 }
 
 /// The part around a departure, drawn both ways, and the passes that may tell.
@@ -175,7 +183,9 @@ enum class Drawn : std::uint8_t { AtPasses, Near };
 Views views_of(std::span<const Polygon> members, const Departure& departure, Drawn extent) {
   const auto m = static_cast<std::size_t>(departure.member);
   Views out;
-  out.near = grown(departure.reach, 5 * kRunUp_mm);
+  out.near = departure.reach;
+  out.near.min.array() -= 5 * kRunUp_mm;
+  out.near.max.array() += 5 * kRunUp_mm;
   if (departure.side >= 0) {
     out.passes = passes_across(members[m], departure);
   } else if (!departure.over) {

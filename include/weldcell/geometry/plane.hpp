@@ -52,13 +52,5 @@ struct Box2 {
 };
 /// Bounding box; the polygon must not be empty.
 Box2 bounds(const Polygon& polygon);
-Box2 grown(const Box2& box, double by_mm);
-/// What both boxes hold; max < min when that is nothing.
-Box2 intersection(const Box2& a, const Box2& b);
-/// Boxes that touch are not apart.
-bool apart(const Box2& a, const Box2& b);
-bool contains(const Box2& box, const Vec2& p);
-/// Whether any of the segment lies in the box (rounding counts as within).
-bool meets(const Segment& s, const Box2& box);
 
 }  // namespace weldcell
