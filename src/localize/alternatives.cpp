@@ -118,14 +118,14 @@ std::vector<VisibleEdge> Alternatives::visible(const Variant& part, std::size_t 
   // shows a piece that two share.
   if (outline_of(part, member).empty()) return {};
   const Box2 near = intersection(grown(box_of(part, member), kBeside_mm), grown(region.box, kBeyond_mm));
-  std::vector<const Polygon*> beside;
+  std::vector<Polygon> beside;
   std::size_t own = 0;
   for (const std::size_t m : region.near) {
     if (m != member && apart(box_of(part, m), near)) continue;
     const Polygon& outline = outline_of(part, m);
     if (outline.empty()) continue;
     if (m == member) own = beside.size();
-    beside.push_back(&outline);
+    beside.push_back(outline);
   }
   std::vector<VisibleEdge> out = workpiece::visible_edges(beside, own, region.joint_gap_mm);
   for (VisibleEdge& edge : out) edge.member = static_cast<int>(member);

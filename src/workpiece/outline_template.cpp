@@ -106,17 +106,16 @@ std::vector<std::pair<double, double>> visible_intervals(const Segment& side, co
 }
 
 /// Of two members that share a piece of silhouette only the first one shows it.
-std::vector<Cover> covers_of(std::span<const Polygon* const> members, std::size_t member,
-                             double joint_gap_mm) {
+std::vector<Cover> covers_of(std::span<const Polygon> members, std::size_t member, double joint_gap_mm) {
   std::vector<Cover> covers;
   covers.reserve(members.size());
-  const Box2 own = bounds(*members[member]);
+  const Box2 own = bounds(members[member]);
   for (std::size_t j = 0; j < members.size(); ++j) {
-    if (j == member || members[j]->empty()) continue;
-    const Box2 box = bounds(*members[j]);
+    if (j == member || members[j].empty()) continue;
+    const Box2 box = bounds(members[j]);
     const double reach = 2 * joint_gap_mm + kTouch_mm;
     if (apart(own, box, reach)) continue;
-    covers.push_back({members[j],
+    covers.push_back({&members[j],
                       {Vec2(box.min.array() - reach), Vec2(box.max.array() + reach)},
                       {joint_gap_mm, kTouch_mm, -kTouch_mm},
                       j < member ? 3U : 2U});
@@ -136,16 +135,8 @@ double longest_side(const Polygon& polygon) {
 
 std::vector<VisibleEdge> visible_edges(std::span<const Polygon> members, std::size_t member,
                                        double joint_gap_mm) {
-  std::vector<const Polygon*> each;
-  each.reserve(members.size());
-  for (const Polygon& polygon : members) each.push_back(&polygon);
-  return visible_edges(each, member, joint_gap_mm);
-}
-
-std::vector<VisibleEdge> visible_edges(std::span<const Polygon* const> members, std::size_t member,
-                                       double joint_gap_mm) {
   std::vector<VisibleEdge> out;
-  const Polygon& outline = *members[member];
+  const Polygon& outline = members[member];
   if (outline.empty()) return out;
   out.reserve(outline.size());
   const std::vector<Cover> covers = covers_of(members, member, joint_gap_mm);

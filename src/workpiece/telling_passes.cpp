@@ -70,14 +70,14 @@ bool apart(const Box2& a, const Box2& b) {
 std::vector<VisibleEdge> edges_near(std::span<const Polygon> members, std::size_t member,
                                     const Polygon& outline, const Box2& box,
                                     std::span<const Box2> looked_at) {
-  std::vector<const Polygon*> beside;  // in their order, which decides who shows a piece that two share
+  std::vector<Polygon> beside;  // in their order, which decides who shows a piece that two share
   for (std::size_t m = 0; m < members.size(); ++m) {
     const Polygon& one = m == member ? outline : members[m];
     if (one.empty()) continue;
     const Box2 own = bounds(one);
     if (!apart(own, box) &&
         std::any_of(looked_at.begin(), looked_at.end(), [&](const Box2& b) { return !apart(own, b); }))
-      beside.push_back(&one);
+      beside.push_back(one);
   }
   std::vector<VisibleEdge> out;
   for (std::size_t m = 0; m < beside.size(); ++m) {

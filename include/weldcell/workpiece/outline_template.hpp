@@ -48,8 +48,5 @@ Result<OutlineTemplate> build_template(const Workpiece& workpiece, double joint_
 /// false.
 std::vector<VisibleEdge> visible_edges(std::span<const Polygon> members, std::size_t member,
                                        double joint_gap_mm = 0.5);
-/// The same, of some of a part's members.
-std::vector<VisibleEdge> visible_edges(std::span<const Polygon* const> members, std::size_t member,
-                                       double joint_gap_mm = 0.5);
 
 }  // namespace weldcell::workpiece
