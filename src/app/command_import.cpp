@@ -10,6 +10,7 @@
 #include "weldcell/adapters/cad_child.hpp"
 #include "weldcell/base/markup.hpp"
 #include "weldcell/files/workpiece_file.hpp"
+#include "weldcell/geometry/boxes.hpp"
 
 namespace weldcell::app {
 
@@ -18,11 +19,7 @@ namespace {
 /// The workpiece from above, y up: outlines, round edges dashed, welds red.
 std::string svg_of(const workpiece::Workpiece& workpiece) {
   Box2 all = bounds(workpiece.members.front().outline);
-  for (const workpiece::Member& m : workpiece.members) {
-    const Box2 box = bounds(m.outline);
-    all.min = all.min.cwiseMin(box.min);
-    all.max = all.max.cwiseMax(box.max);
-  }
+  for (const workpiece::Member& m : workpiece.members) all = united(all, bounds(m.outline));
   const Vec2 size = all.max - all.min;
   const double margin = 0.06 * size.maxCoeff(), letter = 0.025 * size.maxCoeff();
   std::string out = fmt::format(

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "weldcell/base/units.hpp"
+#include "weldcell/geometry/boxes.hpp"
 
 namespace weldcell::cad {
 
@@ -34,19 +35,14 @@ using Graph = std::map<int, std::set<int>>;
 Graph arrangement(const std::vector<Segment>& segments, double weld_mm, PointPool& pool) {
   Graph graph;
   std::vector<Box2> boxes;
-  for (const Segment& s : segments) {
-    const Vec2 slack(weld_mm, weld_mm);
-    boxes.push_back({s.a.cwiseMin(s.b) - slack, s.a.cwiseMax(s.b) + slack});
-  }
+  for (const Segment& s : segments) boxes.push_back(grown(bounds(s), weld_mm));
   std::vector<double> cuts;
   for (std::size_t i = 0; i < segments.size(); ++i) {
     const Segment& s = segments[i];
     if (s.length() < weld_mm) continue;
     cuts = {0, 1};
     for (std::size_t k = 0; k < segments.size(); ++k) {
-      const bool apart = (boxes[i].min.array() > boxes[k].max.array()).any() ||
-                         (boxes[k].min.array() > boxes[i].max.array()).any();
-      if (k != i && !apart) add_cuts(s, segments[k], weld_mm, cuts);
+      if (k != i && !apart(boxes[i], boxes[k])) add_cuts(s, segments[k], weld_mm, cuts);
     }
     std::sort(cuts.begin(), cuts.end());
     int last = pool.id(s.a);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "cad/outline.hpp"
+#include "weldcell/geometry/boxes.hpp"
 
 namespace weldcell::cad {
 
@@ -38,11 +39,7 @@ double mm_per_unit(const std::string& units) {
 
 Status check_extent(const CadPart& part, bool inch) {
   Box2 all = bounds(part.members.front().outline);
-  for (const workpiece::Member& m : part.members) {
-    const Box2 box = bounds(m.outline);
-    all.min = all.min.cwiseMin(box.min);
-    all.max = all.max.cwiseMax(box.max);
-  }
+  for (const workpiece::Member& m : part.members) all = united(all, bounds(m.outline));
   const double extent = (all.max - all.min).maxCoeff();
   const std::string size =
       fmt::format("comes out {:.4g} x {:.4g} mm", all.max.x() - all.min.x(), all.max.y() - all.min.y());

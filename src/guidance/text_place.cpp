@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "lens.hpp"
+#include "weldcell/geometry/boxes.hpp"
 
 namespace weldcell::guidance {
 
@@ -16,10 +17,6 @@ bool touches(const Box2& box, Vec2 a, Vec2 b) {
   a -= box.min;
   b -= box.min;
   return clip(a, b, box.max.x() - box.min.x(), box.max.y() - box.min.y());
-}
-
-bool overlap(const Box2& a, const Box2& b) {
-  return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
 
 }  // namespace
@@ -37,7 +34,7 @@ bool TextPlace::free(const Box2& box) const {
       if (touches(box, area[i], area[(i + 1) % area.size()])) return false;
     }
   }
-  return std::none_of(texts_.begin(), texts_.end(), [&](const Box2& t) { return overlap(box, t); });
+  return std::none_of(texts_.begin(), texts_.end(), [&](const Box2& t) { return !apart(box, t); });
 }
 
 PixelText TextPlace::put(const std::string& text, const Vec2& wanted, double height_px, Colour colour) {

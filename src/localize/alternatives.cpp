@@ -5,7 +5,7 @@
 #include <iterator>
 #include <numeric>
 
-#include "boxes.hpp"
+#include "weldcell/geometry/boxes.hpp"
 
 namespace weldcell::localize {
 
@@ -153,9 +153,7 @@ std::vector<VisibleEdge> Alternatives::edges_within(const Variant& part, const R
     if (!part.outline->empty()) changed.push_back(grown(part.box, kBeside_mm));
   }
   const Box2 reached = grown(region.box, 2 * kOnEdge_mm);
-  const auto reaches = [&](const VisibleEdge& e) {
-    return !apart({e.line.a.cwiseMin(e.line.b), e.line.a.cwiseMax(e.line.b)}, reached);
-  };
+  const auto reaches = [&](const VisibleEdge& e) { return !apart(bounds(e.line), reached); };
   std::vector<VisibleEdge> edges;
   for (const std::size_t m : region.near) {
     const Box2& own = box_of(part, m);

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "alternatives.hpp"
-#include "boxes.hpp"
+#include "weldcell/geometry/boxes.hpp"
 
 namespace weldcell::localize {
 

@@ -4,7 +4,7 @@
 #include <numeric>
 
 #include "alternatives.hpp"
-#include "boxes.hpp"
+#include "weldcell/geometry/boxes.hpp"
 
 namespace weldcell::localize {
 

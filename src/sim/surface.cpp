@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "weldcell/geometry/boxes.hpp"
+
 namespace weldcell::sim {
 
 namespace {
@@ -60,13 +62,10 @@ Surface::Surface(const Scene& scene, double reach_mm)
         body.convex = body.convex && side.inward.dot(p) - side.offset > -1e-6;
     }
     if (bodies_.empty()) area_ = body.box;
-    area_.min = area_.min.cwiseMin(body.box.min);
-    area_.max = area_.max.cwiseMax(body.box.max);
+    area_ = united(area_, body.box);
     bodies_.push_back(std::move(body));
   }
-  const Vec2 border = Vec2::Constant(reach_mm_ + kCell_mm);
-  area_.min -= border;
-  area_.max += border;
+  area_ = grown(area_, reach_mm_ + kCell_mm);
   if (!bodies_.empty()) {
     columns_ = static_cast<std::size_t>((area_.max.x() - area_.min.x()) / kCell_mm) + 1;
     rows_ = static_cast<std::size_t>((area_.max.y() - area_.min.y()) / kCell_mm) + 1;

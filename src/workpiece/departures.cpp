@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "outline_sides.hpp"
+#include "weldcell/geometry/boxes.hpp"
 
 namespace weldcell::workpiece {
 
@@ -42,7 +43,7 @@ void add_turns(const Polygon& outline, std::size_t member, double by_mm, std::ve
       turn.outward = far_end ? along : Vec2(-along);
       const Pose2 rotation{0, 0, angle};
       for (const Vec2& p : outline) turn.instead.push_back(pivot + rotation.rotate(p - pivot));
-      turn.reach = both(bounds(outline), bounds(turn.instead));
+      turn.reach = united(bounds(outline), bounds(turn.instead));
       out.push_back(std::move(turn));
     }
   }
@@ -79,7 +80,7 @@ std::vector<Departure> turned_over(std::span<const Polygon> members, std::size_t
           return same_outline(other.instead, d.instead);
         }))
       continue;
-    other.reach = both(bounds(outline), bounds(other.instead));
+    other.reach = united(bounds(outline), bounds(other.instead));
     out.push_back(std::move(other));
   }
   return out;
@@ -110,7 +111,7 @@ std::vector<Departure> departures(std::span<const Polygon> members, std::span<co
       move.instead = move.whole ? shifted(outline, by * side.n) : with_side_moved(outline, k, by);
       if (std::abs(signed_area(move.instead)) < 0.5 * std::abs(signed_area(outline))) continue;
       move.reach = move.whole
-                       ? both(bounds(outline), bounds(move.instead))
+                       ? united(bounds(outline), bounds(move.instead))
                        : bounds({side.a, side.b, move.instead[k], move.instead[(k + 1) % outline.size()]});
       out.push_back(std::move(move));
     }
@@ -133,7 +134,7 @@ std::vector<Departure> shifts(std::span<const Polygon> members, std::size_t memb
     move.end = is_end(outline, k);
     move.outward = side_of(outline, k).n;
     move.instead = shifted(outline, by_mm);
-    move.reach = both(bounds(outline), bounds(move.instead));
+    move.reach = united(bounds(outline), bounds(move.instead));
     if (moves(move) > kMinAcross * by_mm.norm()) out.push_back(std::move(move));
   }
   std::stable_sort(out.begin(), out.end(),

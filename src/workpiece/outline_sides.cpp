@@ -34,6 +34,4 @@ Polygon shifted(const Polygon& outline, const Vec2& by) {
   return out;
 }
 
-Box2 both(const Box2& a, const Box2& b) { return {a.min.cwiseMin(b.min), a.max.cwiseMax(b.max)}; }
-
 }  // namespace weldcell::workpiece

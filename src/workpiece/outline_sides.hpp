@@ -27,7 +27,4 @@ Extent extent(const Polygon& outline, const Vec2& axis);
 
 Polygon shifted(const Polygon& outline, const Vec2& by);
 
-/// The box around both.
-Box2 both(const Box2& a, const Box2& b);
-
 }  // namespace weldcell::workpiece

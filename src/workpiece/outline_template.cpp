@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "self_similarity.hpp"
+#include "weldcell/geometry/boxes.hpp"
 
 namespace weldcell::workpiece {
 
@@ -27,11 +28,6 @@ void append_crossings(const Segment& line, const Polygon& polygon, std::vector<d
     const double s = cross(p - line.a, d) / denominator;
     if (t > 0 && t < 1 && s > -1e-9 && s < 1 + 1e-9) out.push_back(t);
   }
-}
-
-bool apart(const Box2& a, const Box2& b, double margin_mm) {
-  return (a.min.array() > b.max.array() + margin_mm).any() ||
-         (b.min.array() > a.max.array() + margin_mm).any();
 }
 
 Segment shifted(const Segment& s, const Vec2& by) { return {s.a + by, s.b + by}; }
@@ -60,12 +56,12 @@ struct Stretch {
 };
 std::vector<Stretch> stretches(const Segment& side, const std::vector<Cover>& covers) {
   constexpr double kSlack = 1e-9;
-  const Box2 own{side.a.cwiseMin(side.b), side.a.cwiseMax(side.b)};
+  const Box2 own = bounds(side);
   const Vec2 d = side.b - side.a;
   std::vector<Stretch> out;
   out.reserve(covers.size());
   for (const Cover& cover : covers) {
-    if (apart(own, cover.box, 0)) continue;
+    if (apart(own, cover.box)) continue;
     const Vec2 half = (cover.box.max - cover.box.min) / 2;
     const double middle = (cover.box.min + half - side.a).dot(d) / d.squaredNorm();
     const double reach = half.dot(d.cwiseAbs()) / d.squaredNorm() + kSlack;
@@ -112,13 +108,9 @@ std::vector<Cover> covers_of(std::span<const Polygon> members, std::size_t membe
   const Box2 own = bounds(members[member]);
   for (std::size_t j = 0; j < members.size(); ++j) {
     if (j == member || members[j].empty()) continue;
-    const Box2 box = bounds(members[j]);
-    const double reach = 2 * joint_gap_mm + kTouch_mm;
-    if (apart(own, box, reach)) continue;
-    covers.push_back({&members[j],
-                      {Vec2(box.min.array() - reach), Vec2(box.max.array() + reach)},
-                      {joint_gap_mm, kTouch_mm, -kTouch_mm},
-                      j < member ? 3U : 2U});
+    const Box2 reach = grown(bounds(members[j]), 2 * joint_gap_mm + kTouch_mm);
+    if (apart(own, reach)) continue;
+    covers.push_back({&members[j], reach, {joint_gap_mm, kTouch_mm, -kTouch_mm}, j < member ? 3U : 2U});
   }
   return covers;
 }

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "outline_sides.hpp"
+#include "weldcell/geometry/boxes.hpp"
 #include "weldcell/workpiece/departures.hpp"
 
 namespace weldcell::workpiece {
@@ -61,10 +62,6 @@ bool among(const Met& one, const std::vector<Met>& all) {
   });
 }
 
-bool apart(const Box2& a, const Box2& b) {
-  return (a.min.array() > b.max.array()).any() || (b.min.array() > a.max.array()).any();
-}
-
 /// Edges that the members show near the box, one of them with another outline, and in any of the boxes looked
 /// at; elsewhere they may lack cuts, or be missing.
 std::vector<VisibleEdge> edges_near(std::span<const Polygon> members, std::size_t member,
@@ -102,7 +99,7 @@ Segment with_clear_ends(Segment pass, std::span<const VisibleEdge> edges) {
 
 /// All that a pass may come near to once its ends are clear.
 Box2 neighbourhood(const Segment& pass) {
-  Box2 out = bounds({pass.a, pass.b});
+  Box2 out = bounds(pass);
   constexpr double kRoom_mm = kEndSteps * kEndStep_mm + kClear_mm;
   out.min.array() -= kRoom_mm;
   out.max.array() += kRoom_mm;
@@ -222,7 +219,7 @@ constexpr Places kEverywhere = (Places{1} << (kTried * kTried)) - 1;
 Places told_by(const Views& views, std::span<const Segment> passes, double off_mm) {
   std::array<int, kTried * kTried> told{};
   for (const Segment& pass : passes) {
-    const Box2 own = bounds({pass.a, pass.b});
+    const Box2 own = bounds(pass);
     if ((own.min.array() > views.near.max.array()).any() || (views.near.min.array() > own.max.array()).any())
       continue;
     for (int i = 0; i < kTried * kTried; ++i) {
